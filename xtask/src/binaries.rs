@@ -1,7 +1,7 @@
-//! Every test of the workspace: one binary a package, run by modules, as many at a time as there are processors.
+//! Runs every test of the workspace, one binary per package, in parallel by modules.
 //!
 //! `cargo test` runs one binary after the other, and at the end of each all processors but one wait for its longest test. Here a
-//! job is a module of a binary (what its tests share is made once), the longest start first, and one line says how each ended.
+//! job is a module of a binary, so that its tests share their fixtures. The longest jobs start first. Each prints one line.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::path::{Path, PathBuf};
@@ -14,22 +14,22 @@ use crate::progress::{Durations, Progress};
 use crate::run::{Outcome, cargo};
 use crate::{setup, skips};
 
-/// How tests are run.
+/// Mode of a test run.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Mode {
-    /// Every test at full length, the long ones too.
+    /// Run every test at full length, including long tests.
     pub full: bool,
-    /// The cross compiler or the emulator is missing, which a step before has said: what needs it is skipped.
+    /// The cross compiler or the emulator is missing, as an earlier step reported: skip what needs it.
     pub tools_missing: bool,
 }
 
-/// Modules whose tests mostly wait: for time that passes, or for another process.
+/// Modules whose tests mostly wait, for time or for another process.
 const WAITING: [&str; 4] = ["cli all::rt_pc", "cli all::operate", "cli all::kills", "cli all::interrupt"];
 
-/// Packages without a test, whose libraries would be compiled a second time for none.
+/// Packages without tests; their libraries would be compiled a second time for nothing.
 const WITHOUT_TESTS: [&str; 3] = ["controller", "controller-with-passes", "specgen-law"];
-/// Packages whose own tests take seconds, and their libraries 7 to 54 CPU-seconds each to compile for them: in the full run only. What they
-/// compute is tested through the command and across crates in the short run, too; the golden constants of the compiler stay there.
+/// Packages whose own tests take seconds, but whose libraries need 7 to 54 CPU-seconds each to compile for them. They are tested
+/// only in the full run; the short run tests them through the command and across crates.
 const LONG_TO_COMPILE: [&str; 8] = [
     "specgen-numerics",
     "specgen-run-time",
@@ -41,19 +41,19 @@ const LONG_TO_COMPILE: [&str; 8] = [
     "specgen-report",
 ];
 
-/// The variable of the environment that asks tests for their long form.
+/// The environment variable that selects the full length of tests.
 const FULL: &str = "SPECGEN_FULL";
 
-/// What was run.
+/// Results of a test run.
 #[derive(Debug, Default)]
 pub struct TestResults {
     /// `package::module::test`, sorted, with whether it passed.
     pub tests: Vec<(String, bool)>,
-    /// Why a test or a part of one was not run: job, reason.
+    /// Tests, or parts of one, that were skipped: job, reason.
     pub skipped: Vec<(String, String)>,
 }
 
-/// Compiles every test binary of the workspace without running it, those that take long only for a `full` run; errors are printed by cargo.
+/// Compiles every test binary of the workspace, those of [`LONG_TO_COMPILE`] only for a `full` run. Cargo prints the errors.
 pub fn compile(root: &Path, full: bool) -> Result<Vec<Binary>, String> {
     let arguments = ["test", "--release", "--workspace", "--no-run", "--message-format=json-render-diagnostics"];
     let left_out = WITHOUT_TESTS.iter().chain(LONG_TO_COMPILE.iter().filter(|_| !full));
@@ -61,7 +61,7 @@ pub fn compile(root: &Path, full: bool) -> Result<Vec<Binary>, String> {
     let lengthy = ["--config", "profile.release.package.specgen-tests.opt-level=2"];
     let output = cargo(root, &arguments)
         .args(without)
-        // Millions of ticks are judged by the tests' own code.
+        // The tests' own code checks millions of ticks.
         .args(lengthy.into_iter().filter(|_| full))
         .stderr(Stdio::inherit())
         .output()
@@ -77,7 +77,7 @@ pub fn compile(root: &Path, full: bool) -> Result<Vec<Binary>, String> {
     Ok(binaries)
 }
 
-/// Runs the binaries' tests, then looks at what was skipped.
+/// Runs the tests, then checks what was skipped.
 pub fn test(root: &Path, binaries: &[Binary], mode: Mode, ran: &mut TestResults) -> Outcome {
     let kept = root.join("target/tests");
     let durations = Durations::read(&kept.join("durations.json"));
@@ -86,7 +86,7 @@ pub fn test(root: &Path, binaries: &[Binary], mode: Mode, ran: &mut TestResults)
         Err(why) => return Outcome::Failed(why),
     };
     let workers = std::thread::available_parallelism().map_or(1, usize::from);
-    // What earlier runs left; a folder that cannot be removed is nobody's matter, as names are not used twice.
+    // Remove files of earlier runs. An error does not matter, as names are not reused.
     let _ = std::fs::remove_dir_all(kept.join("scratch"));
     println!("{} modules of {} test binaries, {workers} at a time", jobs.len(), binaries.len());
     let begun = SystemTime::now();
@@ -112,7 +112,7 @@ pub fn test(root: &Path, binaries: &[Binary], mode: Mode, ran: &mut TestResults)
     );
     if failed.is_empty() && !mode.full && builds.libraries > MOST {
         return Outcome::Failed(format!(
-            "{} host libraries, at most {MOST} are to be: let a test run the law on the compiled spec (`at_run_time`)",
+            "{} host libraries, more than {MOST}: let tests run the law on the compiled spec (`at_run_time`)",
             builds.libraries
         ));
     }
@@ -120,10 +120,10 @@ pub fn test(root: &Path, binaries: &[Binary], mode: Mode, ran: &mut TestResults)
         return skipped;
     }
     failed.sort();
-    Outcome::Failed(format!("see the failed tests above, of {}", failed.join(", ")))
+    Outcome::Failed(format!("see the failed tests above: {}", failed.join(", ")))
 }
 
-/// The examples in the documentation, of which one is shown where it fails: most crates have none.
+/// Runs the examples in the documentation, and shows the output only if one fails.
 pub fn examples(root: &Path) -> Outcome {
     // Its examples name the crate `controller`; with `--doc`, cargo does not read `doctest = false`.
     let without = "--exclude=controller-with-passes";
@@ -140,15 +140,15 @@ pub fn examples(root: &Path) -> Outcome {
 
 /// A compiled test binary.
 pub struct Binary {
-    /// Package and target, such as `specgen-tests all`; the target is left out where it is the library.
+    /// Package and target, such as `specgen-tests all`; only the package for its library.
     name: String,
     executable: PathBuf,
-    /// Folder of its package: where cargo would run it.
+    /// Folder of its package, where cargo would run it.
     folder: PathBuf,
 }
 
 impl Binary {
-    /// The test binary that a message of cargo speaks of, if it does.
+    /// The test binary in a message of cargo, if there is one.
     fn of(line: &str) -> Option<Self> {
         let message: serde_json::Value = serde_json::from_str(line).ok()?;
         if message["reason"] != "compiler-artifact" || message["profile"]["test"] != true {
@@ -166,7 +166,7 @@ impl Binary {
         })
     }
 
-    /// Paths of its tests; ignored ones only in a `full` run.
+    /// Paths of its tests, including ignored ones in a `full` run.
     fn tests(&self, full: bool) -> Result<Vec<String>, String> {
         let list = |more: &[&str]| -> Result<Vec<String>, String> {
             let mut command = Command::new(&self.executable);
@@ -188,7 +188,7 @@ struct Job<'a> {
     tests: Vec<String>,
 }
 
-/// The longest first: one that comes last would run alone.
+/// The jobs, longest first: a long job that starts last would run alone.
 fn jobs<'a>(binaries: &'a [Binary], durations: &Durations, full: bool) -> Result<Vec<Job<'a>>, String> {
     let mut jobs = Vec::new();
     for binary in binaries {
@@ -206,7 +206,7 @@ fn jobs<'a>(binaries: &'a [Binary], durations: &Durations, full: bool) -> Result
     Ok(jobs)
 }
 
-/// How a job ended.
+/// Result of a job.
 struct JobResult {
     name: String,
     good: bool,
@@ -215,8 +215,8 @@ struct JobResult {
     skipped: Vec<String>,
 }
 
-/// Runs them; a line for each, with all that it printed where it failed. Those that wait have a worker of their own beside one
-/// for each processor, which help it when they have nothing else to do.
+/// Runs jobs, and prints a line for each, with its output if it failed. There is one worker per processor, and another for jobs
+/// that mostly wait; idle workers help with those.
 fn run(jobs: &[Job<'_>], workers: usize, kept: &Path, durations: &Durations, mode: Mode) -> Vec<JobResult> {
     let (waiting, computing): (Vec<usize>, Vec<usize>) =
         (0..jobs.len()).partition(|index| WAITING.contains(&jobs[*index].name.as_str()));
@@ -234,7 +234,7 @@ fn run(jobs: &[Job<'_>], workers: usize, kept: &Path, durations: &Durations, mod
             let start = Instant::now();
             let (good, text) = job.run(kept, mode, worker);
             let ended = job.ended(good, &text, start.elapsed());
-            // One at a time, so that outputs do not mix. A poisoned lock would mean that printing panicked.
+            // Under a lock, so that outputs do not mix. A poisoned lock would mean that printing panicked.
             let mut done = done.lock().unwrap_or_else(PoisonError::into_inner);
             let (list, progress) = &mut *done;
             let line = progress.ended(index, ended.took);
@@ -255,10 +255,10 @@ fn run(jobs: &[Job<'_>], workers: usize, kept: &Path, durations: &Durations, mod
 }
 
 impl Job<'_> {
-    /// Whether all passed, and what was printed. One test at a time: the other processors have other jobs.
+    /// Runs the tests one at a time, because other processors have other jobs. Returns whether all passed, and the output.
     fn run(&self, kept: &Path, mode: Mode, worker: usize) -> (bool, String) {
         let mut command = Command::new(&self.binary.executable);
-        // What cargo sets at run time and a test may read.
+        // Variables that cargo would set.
         command
             .current_dir(&self.binary.folder)
             .env("CARGO_MANIFEST_DIR", &self.binary.folder)
@@ -286,7 +286,7 @@ impl Job<'_> {
         let failed = |test: &str| !text.lines().any(|line| line == format!("test {test} ... ok"));
         JobResult {
             name: self.name.clone(),
-            // A binary that runs none of the tests that are named ends well, too.
+            // A binary that finds none of the named tests also succeeds.
             good: good && passed(text) == Some(self.tests.len()),
             took,
             tests: self.tests.iter().map(|test| (format!("{} {test}", self.binary.name), !failed(test))).collect(),
@@ -295,7 +295,7 @@ impl Job<'_> {
     }
 }
 
-/// How many tests a binary says to have passed; what a test printed comes before.
+/// Number of passed tests in a binary's own summary, which comes after the output of the tests.
 fn passed(text: &str) -> Option<usize> {
     let counts = text.lines().rev().filter_map(|line| line.strip_prefix("test result: ok. ")?.split_once(" passed"));
     counts.map(|(count, _)| count.parse().ok()).next()?
@@ -316,7 +316,7 @@ mod tests {
     }
 
     #[test]
-    #[ignore = "long: it is there for the test above, and fails wherever a run that is not full takes it"]
+    #[ignore = "long: used by the test above; it fails in a run that is not full"]
     fn a_long_test() {
         assert!(std::env::var_os(FULL).is_some(), "{FULL} is not set");
     }

@@ -1,4 +1,4 @@
-//! How many controllers the tests had built, or took from the cache of builds: each takes seconds where the cache is cold.
+//! Counts the controllers that the tests built or took from the build cache. Each takes seconds if the cache is cold.
 
 use std::ffi::OsStr;
 use std::fs::{self, File};
@@ -6,12 +6,12 @@ use std::io::Read;
 use std::path::Path;
 use std::time::SystemTime;
 
-/// Most host libraries that the short test run may ask for.
+/// Largest number of host libraries in the short test run.
 pub const MOST: usize = 10;
-/// Bytes of an entry that hold its digest and where the build was left, see `specgen_toolchain::cache`.
+/// Bytes of a cache entry with its digest and the path of the build, see `specgen_toolchain::cache`.
 const HEAD: u64 = 512;
 
-/// Builds that were asked for, each counted once.
+/// Number of requested builds, each counted once.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Builds {
     /// Controllers as libraries for this computer.
@@ -21,7 +21,7 @@ pub struct Builds {
 }
 
 impl Builds {
-    /// Those in a folder of kept builds that were made or taken since then: both set the time of the entry.
+    /// Builds in a cache folder that were made or used since `begun`: both set the time of the entry.
     pub fn since(folder: &Path, begun: SystemTime) -> Self {
         let mut builds = Self::default();
         for entry in fs::read_dir(folder).into_iter().flatten().map_while(Result::ok) {

@@ -1,19 +1,19 @@
-//! The changelog is written a fragment a change, so that two changes never meet in one line: a release puts them together.
+//! The changelog: each change is a fragment in its own file, so that changes never conflict. A release merges the fragments.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Where fragments are: `SUBJECT-added.md`, `-changed.md` or `-fixed.md`, each an entry without a bullet.
+/// Folder of fragments: `SUBJECT-added.md`, `-changed.md` or `-fixed.md`, each an entry without a bullet.
 const FOLDER: &str = "changelog";
-/// Ends of names, and the sections that they go to.
+/// Suffixes of names, and their sections.
 const SECTIONS: [(&str, &str); 3] = [("added", "Added"), ("changed", "Changed"), ("fixed", "Fixed")];
-/// What stands above the newest release.
+/// The heading above the newest release.
 const UNRELEASED: &str = "## Unreleased\n";
 
 /// Moves all fragments into CHANGELOG.md, below a heading of `version`.
 ///
 /// # Errors
-/// A fragment whose name has no section or that is empty, no fragment, a version that is there, or what the file system says.
+/// A fragment has no section or is empty, there is no fragment, the version exists, or a file cannot be read or written.
 pub fn release(root: &Path, version: &str) -> Result<(), String> {
     let fragments = fragments(&root.join(FOLDER))?;
     let path = root.join("CHANGELOG.md");
@@ -30,10 +30,10 @@ pub fn release(root: &Path, version: &str) -> Result<(), String> {
     Ok(())
 }
 
-/// Whether CHANGELOG.md has `version`, and no fragment is left out.
+/// Checks that CHANGELOG.md has `version`, and that no fragment is left.
 ///
 /// # Errors
-/// What is missing, with the command that adds it.
+/// Something is missing; the text has the command that adds it.
 pub fn is_released(root: &Path, version: &str) -> Result<(), String> {
     let path = root.join("CHANGELOG.md");
     let text = fs::read_to_string(&path).map_err(|error| format!("{}: {error}", path.display()))?;
@@ -46,7 +46,7 @@ pub fn is_released(root: &Path, version: &str) -> Result<(), String> {
     Ok(())
 }
 
-/// Path, section and text of each, by name.
+/// Path, section and text of each fragment, sorted by name.
 fn fragments(folder: &Path) -> Result<Vec<(PathBuf, &'static str, String)>, String> {
     let entries = fs::read_dir(folder).map_err(|error| format!("{}: {error}", folder.display()))?;
     let mut paths: Vec<PathBuf> = entries.map_while(Result::ok).map(|entry| entry.path()).collect();
@@ -67,13 +67,13 @@ fn fragments(folder: &Path) -> Result<Vec<(PathBuf, &'static str, String)>, Stri
     paths.into_iter().map(read).collect()
 }
 
-/// The changelog with a release of these entries (section, text), sections in their order, below what is not released.
+/// The changelog with a release of these entries (section, text), in the order of sections, below the heading for unreleased changes.
 fn with_release(old: &str, version: &str, entries: &[(&str, &str)]) -> Result<String, String> {
     if entries.is_empty() {
         return Err(format!("no fragment in {FOLDER}/: there is nothing to release"));
     }
     if old.lines().any(|line| line == format!("## {version}")) {
-        return Err(format!("CHANGELOG.md has {version} already"));
+        return Err(format!("CHANGELOG.md already has {version}"));
     }
     let (head, released) =
         old.split_once(UNRELEASED).ok_or_else(|| format!("CHANGELOG.md has no line `{}`", UNRELEASED.trim()))?;

@@ -1,7 +1,7 @@
-//! Fuzzing guided by coverage: `tests/fuzz` under libFuzzer, with debug assertions and overflow checks.
+//! Coverage-guided fuzzing: `tests/fuzz` under libFuzzer, with debug assertions and overflow checks.
 //!
-//! Inputs that are worth keeping stand in `tests/fuzz/corpus`, those of a run in `target/fuzz`, from which `keep` takes the
-//! smallest set that reaches every edge of the program that was reached.
+//! The corpus is in `tests/fuzz/corpus`. A run writes new inputs to `target/fuzz`; `keep` reduces both to the smallest corpus with
+//! the same coverage.
 
 use std::fs;
 use std::path::Path;
@@ -13,18 +13,18 @@ use crate::run::{Outcome, Report, cargo, expect_success};
 
 /// Its own workspace.
 pub const MANIFEST: &str = "tests/fuzz/Cargo.toml";
-/// Names of the targets: `TARGETS` of `tests/fuzz/targets`.
+/// Names of the targets, as in `TARGETS` of `tests/fuzz/targets`.
 const TARGETS: [&str; 5] = ["spec", "csv", "record", "link", "operator"];
-/// Inputs that are kept, a folder for each target.
+/// The corpus, with a folder for each target.
 const CORPUS: &str = "tests/fuzz/corpus";
 /// Inputs of earlier runs, a folder for each target, and the build.
 const WORK: &str = "target/fuzz";
-/// For each target, unless another time is asked for.
+/// Default time per target, s.
 const SECONDS: u32 = 300;
-/// Longest input, bytes: every spec of the repository fits.
+/// Longest input, bytes; every spec of the repository fits.
 const LONGEST: usize = 16_384;
-/// Counters of edges, and of what comparisons compare: what libFuzzer is guided by. No sanitizer: the product forbids `unsafe`
-/// but for a few calls of the system, which no target reaches.
+/// Instrumentation for libFuzzer: edge counters and comparison traces. There is no sanitizer: the product forbids `unsafe` except
+/// for a few system calls, which no target reaches.
 const COVERAGE: [&str; 5] = [
     "-Cpasses=sancov-module",
     "-Cllvm-args=-sanitizer-coverage-level=4",
@@ -33,10 +33,10 @@ const COVERAGE: [&str; 5] = [
     "-Cllvm-args=-sanitizer-coverage-trace-compares",
 ];
 
-/// What to do with a target.
+/// The work for a target.
 type Work<'a> = Box<dyn Fn(&str) -> Outcome + 'a>;
 
-/// `cargo xtask fuzz [SECONDS [TARGET]]`, `cargo xtask fuzz keep`; none if the arguments are something else.
+/// `cargo xtask fuzz [SECONDS [TARGET]]`, `cargo xtask fuzz keep`; none if the arguments are invalid.
 pub fn command(root: &Path, arguments: &[&str]) -> Option<ExitCode> {
     let mut time = None;
     let (targets, work): (Vec<&str>, Work) = match *arguments {
@@ -69,12 +69,12 @@ pub fn command(root: &Path, arguments: &[&str]) -> Option<ExitCode> {
 
 fn build(root: &Path) -> Outcome {
     let mut build = cargo(root, &["build", "--release", "--locked", "--manifest-path", MANIFEST, "--target", &host()]);
-    // For a target, so that build scripts and macros do without.
+    // With `--target`, so that build scripts and macros are not instrumented.
     build.env("CARGO_TARGET_DIR", root.join(WORK)).env("CARGO_ENCODED_RUSTFLAGS", COVERAGE.join("\u{1f}"));
     expect_success(build, "see above")
 }
 
-/// Fuzzes from the kept inputs on; what is new is added to those of earlier runs.
+/// Fuzzes, starting from the corpus; new inputs are added to those of earlier runs.
 fn run(root: &Path, target: &str, seconds: u32) -> Outcome {
     let (found, kept) = (root.join(WORK).join(target), root.join(CORPUS).join(target));
     let failed = root.join(WORK).join(format!("failed-{target}-"));
@@ -86,13 +86,13 @@ fn run(root: &Path, target: &str, seconds: u32) -> Outcome {
     fuzzer.arg(format!("-max_len={LONGEST}")).arg(format!("-artifact_prefix={}", failed.display()));
     fuzzer.arg(found).arg(&kept);
     let fix = format!(
-        "an input that fails is named above; move it to {CORPUS}/{target}, where the tests repeat it: \
+        "the failing input is named above; move it to {CORPUS}/{target}, where a test repeats it: \
          cargo test --release -p specgen-tests fuzz_corpus"
     );
     expect_success(fuzzer, &fix)
 }
 
-/// Makes the smallest set of inputs that reaches every edge that any of them reaches the kept one.
+/// Replaces the corpus with the smallest set of all inputs that has the same coverage.
 fn keep(root: &Path, target: &str) -> Outcome {
     let (found, kept) = (root.join(WORK).join(target), root.join(CORPUS).join(target));
     let fresh = root.join(WORK).join(format!("kept-{target}"));
@@ -116,7 +116,7 @@ fn keep(root: &Path, target: &str) -> Outcome {
     }
 }
 
-/// Puts the files of one folder in the place of another's, but for those that once failed; how many there are now.
+/// Replaces the files of a folder, except inputs that once failed. Returns the number of files.
 fn replace(fresh: &Path, kept: &Path) -> std::io::Result<usize> {
     for entry in fs::read_dir(kept)? {
         let entry = entry?;

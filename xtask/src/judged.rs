@@ -1,5 +1,5 @@
-//! Tests in workspaces of their own, whose dependencies take longer to compile than all they do. They are run where something
-//! that they judge has changed since it was last found good, and in the full run, which writes down what was found good.
+//! Standalone test suites in their own workspaces, whose dependencies take long to compile. A suite runs only if its inputs have
+//! changed since it last passed. The full run always runs it and commits the digest of the inputs.
 
 use std::fs;
 use std::io;
@@ -7,23 +7,23 @@ use std::path::{Path, PathBuf};
 
 use crate::run::{Outcome, cargo, expect_success};
 
-/// Beside the manifest: SHA-256 of all that was found good last.
+/// File beside the manifest: SHA-256 of the inputs of the last good run.
 const JUDGED: &str = "judged.txt";
 
-/// Such tests.
-pub struct Trial {
-    /// Of the workspace; all of its own sources are judged.
+/// A standalone test suite.
+pub struct Suite {
+    /// Manifest of the workspace; all of its own sources are inputs.
     pub manifest: &'static str,
-    /// What else is: files by folder and how their names end.
-    pub judges: &'static [(&'static str, &'static str)],
+    /// Other inputs: files by folder and suffix.
+    pub inputs: &'static [(&'static str, &'static str)],
 }
 
-impl Trial {
-    /// Runs it, unless all that it would judge is what was judged last.
+impl Suite {
+    /// Runs the suite unless its inputs are those of the last good run.
     pub fn unless_unchanged(&self, root: &Path) -> Outcome {
         match self.digest(root) {
             Ok(digest) if fs::read_to_string(self.kept(root)).is_ok_and(|kept| kept.trim() == digest) => {
-                println!("found good before, and unchanged since: {digest}");
+                println!("passed before, and inputs are unchanged: {digest}");
                 Outcome::Passed
             }
             Ok(_) => self.run(root),
@@ -31,7 +31,7 @@ impl Trial {
         }
     }
 
-    /// Runs it, and writes down what was found good.
+    /// Runs the suite; if it passes, writes the digest of its inputs.
     pub fn run_and_keep(&self, root: &Path) -> Outcome {
         let outcome = self.run(root);
         if !matches!(outcome, Outcome::Passed) {
@@ -43,7 +43,7 @@ impl Trial {
         }
     }
 
-    /// Runs it with its lints.
+    /// Runs the suite and its lints.
     fn run(&self, root: &Path) -> Outcome {
         let package = ["--quiet", "--locked", "--all-targets", "--manifest-path", self.manifest];
         for (command, more) in [("clippy", &["--", "-D", "warnings"][..]), ("test", &[])] {
@@ -63,11 +63,11 @@ impl Trial {
         root.join(self.folder()).join(JUDGED)
     }
 
-    /// Of all that is judged: names and contents.
+    /// Digest of names and contents of all inputs.
     fn digest(&self, root: &Path) -> io::Result<String> {
         let own = [(self.folder(), ".rs"), (self.folder(), ".toml"), (self.folder(), ".lock")];
         let mut files = Vec::new();
-        for (folder, end) in self.judges.iter().copied().chain(own) {
+        for (folder, end) in self.inputs.iter().copied().chain(own) {
             for entry in fs::read_dir(root.join(folder))? {
                 let name = entry?.file_name();
                 if name.to_string_lossy().ends_with(end) {
@@ -76,13 +76,13 @@ impl Trial {
             }
         }
         files.sort();
-        let mut judged = Vec::new();
+        let mut bytes = Vec::new();
         for file in files {
             let content = fs::read(root.join(&file))?;
-            judged.extend(format!("{} {}\n", file.display(), content.len()).into_bytes());
-            judged.extend(content);
+            bytes.extend(format!("{} {}\n", file.display(), content.len()).into_bytes());
+            bytes.extend(content);
         }
-        Ok(crate::sha256(&judged))
+        Ok(crate::sha256(&bytes))
     }
 }
 
@@ -91,8 +91,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_change_of_anything_that_is_judged_is_seen() {
-        let trial = Trial { manifest: "trial/Cargo.toml", judges: &[("specs", ".toml"), ("specs", "schema.json")] };
+    fn a_change_of_any_input_is_seen() {
+        let trial = Suite { manifest: "trial/Cargo.toml", inputs: &[("specs", ".toml"), ("specs", "schema.json")] };
         let folder = tempfile::tempdir().unwrap();
         let root = folder.path();
         let files =

@@ -1,12 +1,12 @@
-//! Runs cargo and other programs step by step, and says how each step ended. The developer commands that compute with the product
-//! itself are the program `maintain` of `tests`: this crate compiles in seconds, so that one call of cargo builds all the rest.
+//! Runs cargo and other programs in steps, and reports the result of each. Developer commands that use the product itself are in
+//! the program `maintain` of `tests`. This crate compiles in seconds, so that one call of cargo then builds everything else.
 
 use std::path::{Path, PathBuf};
 
 pub mod run;
 pub mod setup;
 
-/// The repository: this crate stands directly below it.
+/// The repository, the parent folder of this crate.
 #[must_use]
 pub fn root() -> PathBuf {
     let here = Path::new(env!("CARGO_MANIFEST_DIR"));

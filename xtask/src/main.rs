@@ -21,25 +21,26 @@ use xtask::{root, run, setup};
 
 const USAGE: &str = "usage: cargo xtask COMMAND
 
-  setup   installs what the tests need: a cross compiler for Cortex-M and QEMU
-  test    setup, then formatting, every test at its short length, freshness of generated files, lock files and licences; with the
-          variable CI set, lints, too
+  setup   installs the tools that the tests need: a cross compiler for Cortex-M, and QEMU
+  test    runs setup, then checks formatting, all tests in short form, generated files, lock files and licences; with CI set, also
+          lints
   test --full
-          every test at full length, board images, faults, documentation, known defects of packages; writes tests/results.txt
-  mutants [MINUTES | K/N | all]: code changed one operator at a time, to see whether a test notices: sample after sample for so
-          long, one sample, or all; writes tests/results.txt
-  board   SPEC [--target BOARD] [--cycles | --faults [NAME]], or --tested [--faults]: a board's image on an emulated board, from boot to a
-          record that replays; with times by a model of the core, or with faults, or one fault alone
-  fuzz    [SECONDS [TARGET]]: what comes from outside, under a fuzzer guided by coverage, 300 s each target; writes
-          tests/results.txt; `fuzz keep` keeps what it found
-  wheel   the Python package: builds it into target/wheel/dist, and tries it in a fresh environment
-  bless   writes the generated files that are committed anew
-  book    the documentation as HTML, with the generated pages, into target/book
-  changelog VERSION: puts the fragments in changelog/ into CHANGELOG.md, as a release
-  release VERSION [-o DIR]: sources, the command for Linux with glibc and static, the wheel, the book, and their digests, into target/dist
-  fresh   the two commands of the README in minimal Debian roots; `cargo xtask fresh --help`
+          runs all tests at full length, board images, faults and documentation, and checks packages for known defects; writes
+          tests/results.txt
+  mutants [MINUTES | K/N | all]: mutation tests, as samples for a given time, one sample, or all; writes tests/results.txt
+  board   SPEC [--target BOARD] [--cycles | --faults [NAME]], or --tested [--faults]: runs a board's image on an emulated board, from
+          boot to a record that replays; with times by a model of the core, with all faults, or with one
+  fuzz    [SECONDS [TARGET]]: coverage-guided fuzzing of all external inputs, 300 s per target; writes tests/results.txt;
+          `fuzz keep` updates the corpus
+  wheel   builds the Python package into target/wheel/dist, and tests it in a new environment
+  bless   updates the generated files that are committed
+  book    builds the documentation as HTML, with the generated pages, into target/book
+  changelog VERSION: merges the fragments in changelog/ into CHANGELOG.md, as a release
+  release VERSION [-o DIR]: builds sources, the command for Linux (glibc, static), the wheel, the book, and their digests into
+          target/dist
+  fresh   runs the two commands of the README in minimal Debian systems; see `cargo xtask fresh --help`
 
-With SPECGEN_ALLOW_MISSING=1, what needs a tool that cannot be installed is skipped, and said so.";
+With SPECGEN_ALLOW_MISSING=1, steps that need a tool that cannot be installed are skipped and reported.";
 
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -75,7 +76,7 @@ fn misused() -> ExitCode {
     ExitCode::from(2)
 }
 
-/// SHA-256 in hex.
+/// SHA-256 in hexadecimal.
 fn sha256(bytes: &[u8]) -> String {
     Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
 }

@@ -1,5 +1,5 @@
-//! Mutants: operators and bodies changed one at a time (cargo-mutants, `.cargo/mutants.toml`), and whether a test notices. Those that
-//! none notices are in [`LIST`] with a reason each.
+//! Mutation tests: cargo-mutants (`.cargo/mutants.toml`) changes one operator or body at a time, and a test should notice. Mutants
+//! that survive are in [`LIST`], each with a reason.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -9,26 +9,26 @@ use std::time::{Duration, Instant};
 use crate::run::Outcome;
 use crate::setup;
 
-/// Mutants that survive: names, each list of them followed by an indented reason. `#` begins a remark.
+/// Names of surviving mutants, each group followed by an indented reason. `#` starts a comment.
 const LIST: &str = "tests/mutants.txt";
 const INSTALL: &str = "cargo install cargo-mutants --locked";
 
-/// What is run together.
+/// Mutants that are run together.
 struct Group {
     package: &'static str,
-    /// Folder of its workspace, with settings of its own, if that is not the repository's.
+    /// Folder of its workspace, with its own settings, if it is not the repository.
     folder: Option<&'static str>,
-    /// Arguments of cargo-mutants beside the package, before and behind its `--`.
+    /// Other arguments of cargo-mutants, before and after its `--`.
     arguments: [&'static [&'static str]; 2],
-    /// What one sample is: one in so many.
+    /// Size of a sample: one mutant of this many.
     one_in: u32,
-    /// Least share of the mutants to be noticed, in percent.
+    /// Least percentage of noticed mutants.
     bar: usize,
 }
 
 const GROUPS: [Group; 5] = [
     Group { package: "specgen-runtime", folder: None, arguments: [&[], &["--tests"]], one_in: 32, bar: 90 },
-    // Twice: with the reference's controller, and with one that takes a correction and has an input line.
+    // Two test packages: with the reference's controller, and with one that has corrections and an input line.
     Group {
         package: "specgen-board",
         folder: None,
@@ -36,7 +36,7 @@ const GROUPS: [Group; 5] = [
         one_in: 8,
         bar: 90,
     },
-    // Without the test that builds it once more, for a proof about its text.
+    // Without the test that builds the crate again to prove that it has no panic path.
     Group {
         package: "specgen-link",
         folder: None,
@@ -45,14 +45,14 @@ const GROUPS: [Group; 5] = [
         bar: 90,
     },
     Group { package: "specgen-rt-pc", folder: Some("firmware/rt-pc"), arguments: [&[], &[]], one_in: 16, bar: 90 },
-    // Only `lower`, `stability` and `lint` of it. Of cargo's own arguments, for the build too: the library alone, not once more for others.
+    // Only `lower`, `stability` and `lint`. `--lib` is a cargo argument, so that the build also compiles only the library.
     Group { package: "specgen-compiler", folder: None, arguments: [&["--cargo-arg=--lib"], &[]], one_in: 40, bar: 85 },
 ];
 
-/// Which mutants are made.
+/// Selection of mutants.
 #[derive(Debug, PartialEq, Eq)]
 pub enum Sample {
-    /// One sample after the other of each group, for so long.
+    /// Successive samples of each group for this time.
     For(Duration),
     /// The K-th sample of one in N: `K/N`.
     One(String),
@@ -60,7 +60,7 @@ pub enum Sample {
 }
 
 impl Sample {
-    /// By the arguments of the command; none if they are something else.
+    /// Parses the arguments of the command; none if they are invalid.
     pub fn of(arguments: &[&str]) -> Option<Self> {
         match *arguments {
             [] => Some(Self::For(Duration::from_mins(60))),
@@ -72,7 +72,7 @@ impl Sample {
     }
 }
 
-/// Makes them and runs the tests; `counts` becomes a line of how many were noticed.
+/// Makes the mutants and runs the tests. `counts` gets the numbers of noticed mutants.
 pub fn run(root: &Path, sample: &Sample, counts: &mut String) -> Outcome {
     let works = cargo_mutants(root, &["--version"]).output().is_ok_and(|output| output.status.success());
     if !works {
@@ -103,7 +103,7 @@ pub fn run(root: &Path, sample: &Sample, counts: &mut String) -> Outcome {
 
 fn cargo_mutants(root: &Path, arguments: &[&str]) -> Command {
     let mut command = crate::run::cargo(root, &["mutants"]);
-    // The build is that of the copy, in the copy: in a folder that outlives it, one that was interrupted leaves a mutant behind.
+    // Build within the copy of the sources: in a shared target folder an interrupted run would leave a mutant behind.
     command.args(arguments).env_remove("CARGO_TARGET_DIR");
     command
 }
@@ -118,7 +118,7 @@ impl Group {
         command
     }
 
-    /// Runs a sample and says what differs from the list. All mutants that there are become `known`.
+    /// Runs a sample and reports differences from the list. All existing mutants are added to `known`.
     fn run(
         &self,
         root: &Path,
@@ -143,7 +143,7 @@ impl Group {
             Sample::For(time) => {
                 let start = Instant::now();
                 for number in 0..self.one_in {
-                    // Each group has its share of the time, and at least one sample.
+                    // Each group gets an equal share of the time, and at least one sample.
                     if number > 0 && start.elapsed() >= *time / GROUPS.len() as u32 {
                         break;
                     }
@@ -155,7 +155,7 @@ impl Group {
         Ok((self.judge(&noticed, &missed, listed), count))
     }
 
-    /// Makes the mutants of a shard, or all: those that were noticed, and those that survive.
+    /// Makes the mutants of a shard, or all. Returns those that were noticed, and those that survive.
     fn shard(
         &self,
         root: &Path,
@@ -171,7 +171,7 @@ impl Group {
         command.arg("--").args(self.arguments[1]);
         std::fs::create_dir_all(&results).map_err(|error| format!("{}: {error}", results.display()))?;
         let status = command.status().map_err(|error| error.to_string())?;
-        // 2 and 3: some were missed, or did not end.
+        // Exit codes 2 and 3: some were missed, or timed out.
         if !matches!(status.code(), Some(0 | 2 | 3)) {
             return Err(format!("cargo mutants --package {}: {status}; see above", self.package));
         }
@@ -180,7 +180,7 @@ impl Group {
             let text = std::fs::read_to_string(path).unwrap_or_default();
             text.lines().filter_map(|line| names.get(line).cloned()).collect()
         };
-        // A mutant that does not end is one that is noticed.
+        // A mutant that times out counts as noticed.
         Ok([[of("caught.txt"), of("timeout.txt")].concat(), of("missed.txt")])
     }
 
@@ -203,7 +203,7 @@ impl Group {
     }
 }
 
-/// What a mutant is counted with: the file or folder below `src` that it is in.
+/// Module of a mutant for counting: its file or folder below `src`.
 fn module(name: &str) -> &str {
     let path = name.split(':').next().unwrap_or_default();
     let below = path.split_once("/src/").map_or(path, |(_, below)| below);
@@ -214,8 +214,8 @@ fn modules<'a>(names: impl Iterator<Item = &'a String>) -> BTreeSet<&'a str> {
     names.map(|name| module(name)).collect()
 }
 
-/// Names that last, by those of cargo-mutants: without line and column, which every change above moves, but with a number where
-/// a function has several mutants of one kind. Files of a workspace of its own are named from its `folder` on.
+/// Stable names of mutants, by those of cargo-mutants: without line and column, but with a number to distinguish mutants of one
+/// kind in a function. Files of a separate workspace have its `folder` as prefix.
 fn names(list: &str, folder: Option<&str>) -> BTreeMap<String, String> {
     let mut count: BTreeMap<String, u32> = BTreeMap::new();
     let lines = list.lines().filter_map(|line| {
@@ -229,7 +229,7 @@ fn names(list: &str, folder: Option<&str>) -> BTreeMap<String, String> {
     lines.collect()
 }
 
-/// The names in the list; an error where one has no reason.
+/// The names in the list; an error if one has no reason.
 fn read(text: &str) -> Result<BTreeSet<String>, String> {
     let mut names = BTreeSet::new();
     let mut without = None;
@@ -292,7 +292,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_as_listed_is_told() {
+    fn differences_from_the_list_are_reported() {
         let group = Group { package: "p", folder: None, arguments: [&[], &[]], one_in: 1, bar: 50 };
         let strings = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect::<Vec<_>>();
         let listed: BTreeSet<String> = strings(&["a", "b"]).into_iter().collect();

@@ -1,5 +1,5 @@
-//! Packages that others wrote: a step for each lock file looks whether it is fresh and under which licences its packages are;
-//! the full run asks for known defects of them.
+//! Third-party packages: a step for each lock file checks that it is up to date and that the licences of its packages are allowed.
+//! The full run also checks for known defects.
 
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
@@ -8,7 +8,7 @@ use serde_json::Value;
 
 use crate::run::{Outcome, cargo};
 
-/// Licences that ask for no more than their text and the names of authors to be passed on, as SPDX spells them.
+/// Allowed licences (SPDX): they only require that their text and the names of authors are included.
 const ALLOWED: [&str; 14] = [
     "0BSD",
     "Apache-2.0",
@@ -26,7 +26,7 @@ const ALLOWED: [&str; 14] = [
     "Zlib",
 ];
 
-/// Looks at the lock file beside `manifest` and at the licences of all packages in it, whatever system they are for.
+/// Checks the lock file beside `manifest`, and the licences of all packages in it, for all systems.
 pub fn check(root: &Path, manifest: &str) -> Outcome {
     let metadata = |more: &[&str]| {
         let base = ["metadata", "--locked", "--quiet", "--format-version=1", "--manifest-path", manifest];
@@ -39,15 +39,15 @@ pub fn check(root: &Path, manifest: &str) -> Outcome {
     if all.status.success() {
         return judge(&all);
     }
-    // Without a network, packages for other systems may never have come here.
+    // Without a network, packages for other systems may not be available.
     match metadata(&["--offline", "--filter-platform", &host()]) {
         Ok(here) if here.status.success() => match judge(&here) {
             Outcome::Passed => Outcome::Skipped("licences of packages for other systems: no network".to_owned()),
             other => other,
         },
         _ => {
-            let said = String::from_utf8_lossy(&all.stderr);
-            Outcome::Failed(format!("{}; run: cargo xtask bless", said.trim().replace('\n', " ")))
+            let error = String::from_utf8_lossy(&all.stderr);
+            Outcome::Failed(format!("{}; run: cargo xtask bless", error.trim().replace('\n', " ")))
         }
     }
 }
@@ -64,12 +64,12 @@ fn judge(output: &Output) -> Outcome {
         return Outcome::Passed;
     }
     Outcome::Failed(format!(
-        "licences that are not on the list in xtask/src/packages.rs: {}; take another package, or add the licence after reading it",
+        "licences that are not on the list in xtask/src/packages.rs: {}; use another package, or read the licence and add it",
         refused.join(", ")
     ))
 }
 
-/// Packages from elsewhere whose licence is not allowed, or not stated.
+/// Third-party packages whose licence is not allowed, or not stated.
 fn refused(metadata: &Value) -> Vec<String> {
     let packages = metadata["packages"].as_array().into_iter().flatten().filter(|one| !one["source"].is_null());
     let refused = packages.filter(|one| !one["license"].as_str().is_some_and(is_allowed));
@@ -77,7 +77,7 @@ fn refused(metadata: &Value) -> Vec<String> {
     refused.map(|one| format!("{} ({})", name(one), one["license"].as_str().unwrap_or("none stated"))).collect()
 }
 
-/// Whether a licence expression can be met with what is allowed: `OR` offers a choice, `AND` binds tighter and asks for both.
+/// Whether the allowed licences satisfy a licence expression: `OR` offers a choice, `AND` binds tighter and requires both.
 fn is_allowed(expression: &str) -> bool {
     let spaced = expression.replace('(', " ( ").replace(')', " ) ").replace('/', " OR ");
     let words: Vec<&str> = spaced.split_whitespace().collect();
@@ -124,21 +124,21 @@ fn one(words: &mut &[&str]) -> Option<bool> {
     }
 }
 
-/// The system that this runs on, as rustc names it.
+/// The target triple of this computer.
 pub fn host() -> String {
     let output = Command::new("rustc").arg("-vV").output();
     let text = output.map(|output| String::from_utf8_lossy(&output.stdout).into_owned()).unwrap_or_default();
     text.lines().find_map(|line| line.strip_prefix("host: ")).unwrap_or_default().to_owned()
 }
 
-/// A checkout of the RustSec database; without, `cargo audit` fetches it.
+/// Variable with the path of a checkout of the RustSec database; without it `cargo audit` fetches the database.
 const DATABASE: &str = "SPECGEN_ADVISORY_DB";
 
-/// Asks the RustSec database for known defects of the packages in each lock file.
+/// Checks the packages in each lock file for known defects in the RustSec database.
 pub fn advisories(root: &Path, manifests: &[String]) -> Outcome {
     let there = cargo(root, &["audit", "--version"]).stdout(Stdio::null()).stderr(Stdio::null()).status();
     if !there.is_ok_and(|status| status.success()) {
-        return Outcome::Skipped("no cargo-audit here; it comes by: cargo install cargo-audit --locked".to_owned());
+        return Outcome::Skipped("cargo-audit is not installed; run: cargo install cargo-audit --locked".to_owned());
     }
     let mut failed = Vec::new();
     for manifest in manifests {
@@ -155,7 +155,10 @@ pub fn advisories(root: &Path, manifests: &[String]) -> Outcome {
     if failed.is_empty() {
         return Outcome::Passed;
     }
-    Outcome::Failed(format!("known defects, or no database (a checkout of it: {DATABASE}): {}", failed.join(", ")))
+    Outcome::Failed(format!(
+        "known defects, or no database ({DATABASE} can name a checkout of it): {}",
+        failed.join(", ")
+    ))
 }
 
 #[cfg(test)]

@@ -1,4 +1,4 @@
-//! How far a list of jobs is, and how long it may still take, from how long each took last time.
+//! Progress and remaining time of a list of jobs, from their durations in the last run.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -6,10 +6,10 @@ use std::time::{Duration, Instant};
 
 use crate::run::clock;
 
-/// How long jobs take: of the last run on this machine, else of the run that the table below was taken from.
+/// Durations of jobs, from the last run on this machine, or from the table below.
 pub struct Durations(BTreeMap<String, f64>);
 
-/// Seconds, of jobs of eight and more: for the order on a machine that has not run them yet.
+/// Durations of jobs of eight seconds and more, s: for the order of jobs on a machine without an earlier run.
 const TABLE: &[(&str, f64)] = &[
     ("cli all::rt_pc", 65.0),
     ("tests all::supervisor", 25.0),
@@ -35,11 +35,11 @@ const TABLE: &[(&str, f64)] = &[
     ("compiler all::golden", 8.0),
     ("compiler all", 8.0),
 ];
-/// Of a job that neither names.
+/// Duration of other jobs, s.
 const OTHERS: f64 = 1.0;
 
 impl Durations {
-    /// Those of the last run, if there was one.
+    /// Durations of the last run, or those of the table.
     pub fn read(path: &Path) -> Self {
         let last = std::fs::read(path).ok().and_then(|bytes| serde_json::from_slice(&bytes).ok());
         Self(last.unwrap_or_else(|| TABLE.iter().map(|(name, seconds)| ((*name).to_owned(), *seconds)).collect()))
@@ -49,7 +49,7 @@ impl Durations {
         Self(jobs.map(|(name, took)| (name, took.as_secs_f64())).collect())
     }
 
-    /// For the next run. Without it that one only has a worse order, so a failure is no matter.
+    /// Writes durations for the next run. Errors are ignored: they only make its order worse.
     pub fn write(&self, path: &Path) {
         if let Ok(text) = serde_json::to_string_pretty(&self.0) {
             let _ = std::fs::write(path, text);
@@ -61,13 +61,13 @@ impl Durations {
     }
 }
 
-/// Jobs that are done and those that are not.
+/// Completed and open jobs.
 pub struct Progress {
     start: Instant,
     workers: usize,
-    /// Of each job; none once it has ended.
+    /// Expected duration of each job; none once it has ended.
     open: Vec<Option<Duration>>,
-    /// Expected and measured time of those that ended.
+    /// Total expected and measured duration of completed jobs.
     ended: (Duration, Duration),
 }
 
@@ -89,7 +89,7 @@ impl Progress {
         format!("[{:4}/{total}] {gone}, about {} left", total - left, clock(self.left()))
     }
 
-    /// What was expected of the open jobs, by how wrong the expectation was so far.
+    /// Expected time of the open jobs, scaled by the error of the expectation so far.
     fn left(&self) -> Duration {
         let expected: Duration = self.open.iter().flatten().sum();
         let ratio = if self.ended.0.is_zero() { 1.0 } else { self.ended.1.as_secs_f64() / self.ended.0.as_secs_f64() };
@@ -115,7 +115,7 @@ mod tests {
     }
 
     #[test]
-    fn last_durations_come_before_the_table_and_damage_is_no_matter() {
+    fn last_durations_come_before_the_table_and_damage_is_ignored() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("durations.json");
         Durations::of([("a".to_owned(), Duration::from_secs(7))].into_iter()).write(&path);

@@ -1,9 +1,9 @@
-//! What is released: sources, the command for two kinds of Linux, the Python package, the book, and the digests of all.
+//! Builds a release: sources, the command for two kinds of Linux, the Python package, the book, and the digests of all.
 //!
-//! Times are the commit's, folders of this computer are not in the binaries, archives are in the order of names. So two runs of one
-//! commit in one folder give the same bytes with the same compiler: seen of the command for glibc, with all of specgen's own packages
-//! compiled again. In another folder its objects are the same (compared over 122 packages); those of the wheel need not be: cargo
-//! names what its workspace takes from outside by the whole path.
+//! Times are those of the commit, binaries contain no paths of this computer, and archives are sorted by name. So two runs of one
+//! commit in one folder give the same bytes with the same compiler. This was verified for the glibc command, with all of specgen's own
+//! packages compiled again. In another folder its objects are the same (compared over 122 packages); those of the wheel may differ,
+//! because cargo uses absolute paths for packages outside of its workspace.
 
 use std::ffi::OsStr;
 use std::fs;
@@ -13,24 +13,24 @@ use std::process::{Command, ExitCode, Stdio};
 use crate::run::{Outcome, Report, cargo};
 use crate::{changelog, sha256, steps, wheel};
 
-/// Where it builds: other flags than those of the daily work.
+/// Cargo's target folder for releases, whose flags differ from those of daily work.
 const MADE: &str = "target/released";
-/// The targets of the command: any Linux with a glibc of 2.34 or newer; any Linux at all, without what loads a library.
+/// Targets of the command: Linux with glibc 2.34 or newer; any Linux, but without commands that load a library.
 const TARGETS: [&str; 2] = ["x86_64-unknown-linux-gnu", "x86_64-unknown-linux-musl"];
-/// Files that stand beside the command in its archives.
+/// Other files in the archives of the command.
 const BESIDE: [&str; 4] = ["CHANGELOG.md", "LICENSE-APACHE", "LICENSE-MIT", "README.md"];
-/// Manifests that say the version of the product, and the table that it stands in.
+/// Manifests with the version of the product, and its table.
 const VERSIONS: [(&str, &str); 3] = [
     ("Cargo.toml", "[workspace.package]"),
     ("codegen/python/Cargo.toml", "[package]"),
     ("codegen/python/pyproject.toml", "[project]"),
 ];
 /// The spec of `specgen new mine`.
-const MADE_ANEW: &str = "mine/platform.toml";
-/// Digests of all that was made.
+const NEW_SPEC: &str = "mine/platform.toml";
+/// File of the digests.
 const SUMS: &str = "SHA256SUMS";
 
-/// `cargo xtask release VERSION [-o DIR]`; none if the arguments are others.
+/// `cargo xtask release VERSION [-o DIR]`; none if the arguments are invalid.
 pub fn command(root: &Path, arguments: &[&str]) -> Option<ExitCode> {
     let (version, output) = match *arguments {
         [version] if !version.starts_with('-') => (version, root.join("target/dist")),
@@ -72,7 +72,7 @@ fn release(root: &Path, version: &str, output: &Path) -> ExitCode {
             other => other,
         }
     });
-    report.step("tried in an empty folder", || outcome(tried(root, &name, output)));
+    report.step("test in an empty folder", || outcome(tried(root, &name, output)));
     report.step("cargo install of the sources", || outcome(builds.installed(&name, output)));
     report.step("digests", || outcome(digests(output, &name)));
     report.finish()
@@ -82,18 +82,18 @@ fn outcome(result: Result<(), String>) -> Outcome {
     result.map_or_else(Outcome::Failed, |()| Outcome::Passed)
 }
 
-/// What is released.
+/// The released commit.
 #[derive(Default)]
 struct Commit {
     /// Seconds since 1970.
     time: String,
 }
 
-/// Whether the tree is what its commit says, and the version is said everywhere.
+/// Checks that the tree is committed, and that the version is the same everywhere.
 fn ready(root: &Path, version: &str) -> Result<Commit, String> {
     let changed = printed(Command::new("git").current_dir(root).args(["status", "--porcelain"]))?;
     if !changed.is_empty() {
-        return Err(format!("commit these first, or remove them:\n{changed}"));
+        return Err(format!("commit or remove these first:\n{changed}"));
     }
     for (file, table) in VERSIONS {
         let text = read(&root.join(file))?;
@@ -132,7 +132,7 @@ struct Builds<'a> {
 }
 
 impl Builds<'_> {
-    /// Without the folders of this computer.
+    /// Sets up a build without paths of this computer.
     fn environment(&self, command: &mut Command) {
         let home = std::env::var_os("CARGO_HOME").map(PathBuf::from);
         let home = home.or_else(|| Some(std::env::home_dir()?.join(".cargo"))).unwrap_or_default();
@@ -172,13 +172,13 @@ impl Builds<'_> {
         fs::copy(&wheel, &place).map(drop).map_err(|error| format!("{}: {error}", place.display()))
     }
 
-    /// As a user does it who has the sources alone.
+    /// Installs the command as a user with only the sources does.
     fn installed(&self, name: &str, output: &Path) -> Result<(), String> {
         let folder = self.root.join(MADE).join("tried");
         done(Command::new("tar").current_dir(&folder).arg("-xzf").arg(output.join(format!("{name}.tar.gz"))))?;
         let sources = folder.join(name).join("codegen/cli");
         let place = folder.join("installed");
-        // Which takes what is not specgen's from the build of the command.
+        // It reuses third-party packages from the build of the command.
         let mut install = cargo(&folder, &["install", "--quiet", "--locked", "--target", TARGETS[0], "--path"]);
         install.arg(sources).arg("--root").arg(&place);
         self.environment(&mut install);
@@ -189,7 +189,7 @@ impl Builds<'_> {
     }
 }
 
-/// Files in a folder `name`, as `name.tar.gz`: the same files and time (s since 1970) give the same bytes.
+/// Packs files in a folder `name` as `name.tar.gz`. The same files and time (s since 1970) give the same bytes.
 fn pack(files: &[&Path], name: &str, output: &Path, time: &str) -> Result<(), String> {
     let failed = |path: &Path| {
         let shown = path.display().to_string();
@@ -203,7 +203,7 @@ fn pack(files: &[&Path], name: &str, output: &Path, time: &str) -> Result<(), St
     pack_folder(name, output, time)
 }
 
-/// A folder in `output`, as `name.tar.gz` in its place.
+/// Replaces a folder in `output` with `name.tar.gz`.
 fn pack_folder(name: &str, output: &Path, time: &str) -> Result<(), String> {
     let folder = output.join(name);
     let archive = output.join(format!("{name}.tar"));
@@ -216,12 +216,12 @@ fn pack_folder(name: &str, output: &Path, time: &str) -> Result<(), String> {
     zip(&archive)
 }
 
-/// Without name and time in it.
+/// Compresses an archive, without name and time.
 fn zip(archive: &Path) -> Result<(), String> {
     done(Command::new("gzip").args(["-9", "-n", "-f"]).arg(archive))
 }
 
-/// Each command says its version, makes a spec and checks it, in a folder that has nothing else; the wheel compiles it.
+/// Tests each command in an empty folder: it prints its version, creates a spec and checks it. The wheel compiles that spec.
 fn tried(root: &Path, name: &str, output: &Path) -> Result<(), String> {
     let version = name.trim_start_matches("specgen-");
     let folder = root.join(MADE).join("tried");
@@ -246,10 +246,10 @@ fn tried(root: &Path, name: &str, output: &Path) -> Result<(), String> {
         }
         done(command(&["check", "--help"]).stdout(Stdio::null()))?;
         done(&mut command(&["new", "mine", "--like", "reference"]))?;
-        done(&mut command(&["check", MADE_ANEW]))?;
+        done(&mut command(&["check", NEW_SPEC]))?;
         if target != TARGETS[0] {
-            // What has to load a library is refused, with a fix.
-            let refused = command(&["sim", MADE_ANEW]).output().map_err(|error| format!("{archive}: {error}"))?;
+            // Commands that load a library must be refused, with a fix.
+            let refused = command(&["sim", NEW_SPEC]).output().map_err(|error| format!("{archive}: {error}"))?;
             let says = String::from_utf8_lossy(&refused.stderr);
             if refused.status.code() != Some(3) || !says.contains(TARGETS[0]) {
                 return Err(format!("{archive}/specgen sim: {}: {says}", refused.status));
@@ -262,12 +262,12 @@ fn tried(root: &Path, name: &str, output: &Path) -> Result<(), String> {
     if let Outcome::Failed(why) = wheel::environment(&fresh, &[wheel.as_ref()]) {
         return Err(why);
     }
-    let script = format!("import specgen; print(specgen.compile('{MADE_ANEW}').digest)");
+    let script = format!("import specgen; print(specgen.compile('{NEW_SPEC}').digest)");
     let place = folder.join(format!("{name}-{}", TARGETS[0]));
     done(Command::new(fresh.join("bin/python")).current_dir(place).args(["-c", &script]))
 }
 
-/// Names of the files of this version in the folder: those of others may be beside them.
+/// Names of the files of this version in the folder, which may contain other versions.
 fn made_of(output: &Path, name: &str) -> Result<Vec<String>, String> {
     let read = fs::read_dir(output).map_err(|error| format!("{}: {error}", output.display()))?;
     let mut files: Vec<String> = read.filter_map(|entry| entry.ok()?.file_name().into_string().ok()).collect();
@@ -277,7 +277,7 @@ fn made_of(output: &Path, name: &str) -> Result<Vec<String>, String> {
     Ok(files)
 }
 
-/// Writes the digests, and prints what there is.
+/// Writes the digests, and prints the list of files.
 fn digests(output: &Path, name: &str) -> Result<(), String> {
     let files = made_of(output, name)?;
     let mut sums = String::new();
@@ -305,7 +305,7 @@ fn done(command: &mut Command) -> Result<(), String> {
     }
 }
 
-/// What it prints, without the end of the line.
+/// Output of a command, without the trailing newline.
 fn printed(command: &mut Command) -> Result<String, String> {
     let shown = command.get_program().display().to_string();
     let output = command.output().map_err(|error| format!("{shown}: {error}"))?;

@@ -1,4 +1,4 @@
-//! What the last long runs showed, as a file of the repository: a line for each command, with date, commit and result.
+//! Results of the last long runs, as a committed file: a line for each command, with date, commit and result.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -8,19 +8,19 @@ use std::time::{Duration, SystemTime, UNIX_EPOCH};
 use crate::binaries::TestResults;
 use crate::run::Outcome;
 
-/// Where it is kept.
+/// The file.
 const FILE: &str = "tests/results.txt";
 const HEAD: &str =
     "# Written by `cargo xtask test --full`, `fuzz` and `mutants`: date, commit and result of the last run of each.\n";
-/// How many commits old the result of the full run may be.
+/// Largest age of the full run, in commits.
 const OLDEST: usize = 60;
-/// The command whose age is judged.
+/// The command whose age is checked.
 pub const FULL: &str = "full";
 
-/// Writes the line of a command, whether it was good and what it found; the line of an earlier run is replaced.
+/// Writes the line of a command, with its result and findings, in place of its earlier line.
 pub fn write(root: &Path, command: &str, good: bool, found: &str) -> Outcome {
     let commit = git(root, &["rev-parse", "HEAD"]).unwrap_or_else(|| "unknown".to_owned());
-    // What stands in the file itself changes nothing that is tested.
+    // A change of the file itself does not affect the tests.
     let others = format!(":!{FILE}");
     let status = git(root, &["status", "--porcelain", "--untracked-files=no", "--", ".", &others]);
     let changed = if status.is_none_or(|text| !text.is_empty()) { " with changes" } else { "" };
@@ -47,7 +47,7 @@ fn of(line: &str) -> &str {
     line.split(' ').next().unwrap_or_default()
 }
 
-/// Tests that passed, failed and were skipped, how long it took, and a digest of every test with its result.
+/// Numbers of passed, failed and skipped tests, the duration, and a digest of all tests with their results.
 pub fn of_tests(ran: &TestResults, took: Duration) -> String {
     let mut results = String::new();
     for (name, passed) in &ran.tests {
@@ -67,7 +67,7 @@ pub fn of_tests(ran: &TestResults, took: Duration) -> String {
     )
 }
 
-/// Whether the full run is not too long ago; its result is shown. Where there is no history, that cannot be known.
+/// Shows the result of the last full run, and checks its age if the history is available.
 pub fn judge(root: &Path) -> Outcome {
     let text = std::fs::read_to_string(root.join(FILE)).unwrap_or_default();
     let Some(line) = text.lines().find(|line| of(line) == FULL) else {
@@ -76,14 +76,14 @@ pub fn judge(root: &Path) -> Outcome {
     println!("{line}");
     let shallow = git(root, &["rev-parse", "--is-shallow-repository"]);
     if shallow.is_none_or(|answer| answer != "false") {
-        return Outcome::Skipped("its age is not known: this is no clone with its whole history".to_owned());
+        return Outcome::Skipped("its age is unknown: this is not a clone with the whole history".to_owned());
     }
     let commit = line.split_whitespace().nth(2).unwrap_or_default();
     let age = git(root, &["rev-list", "--count", &format!("{commit}..HEAD")]).and_then(|count| count.parse().ok());
     verdict(age)
 }
 
-/// Of the age of the full run in commits, none if its commit is not in the history.
+/// Verdict on the age of the full run in commits, none if its commit is not in the history.
 fn verdict(age: Option<usize>) -> Outcome {
     let again = format!("run `cargo xtask test --full` and commit {FILE}");
     match age {
@@ -95,12 +95,12 @@ fn verdict(age: Option<usize>) -> Outcome {
     }
 }
 
-/// What differs from the commit, if this is a clone.
+/// Uncommitted changes; none if this is not a clone.
 pub fn changes(root: &Path) -> Option<String> {
     git(root, &["status", "--porcelain"])
 }
 
-/// A clone is as it was before.
+/// Checks that the tests have not changed the clone.
 pub fn unchanged(before: Option<&str>, after: Option<&str>) -> Outcome {
     if before == after {
         return Outcome::Passed;

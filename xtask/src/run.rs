@@ -1,38 +1,38 @@
-//! Runs cargo, and keeps the list of what was done and how it went.
+//! Runs cargo, and records steps and their results.
 
 use std::path::Path;
 use std::process::{Command, ExitCode};
 use std::time::{Duration, Instant};
 
-/// Exit code of a program that did not run a step, which was allowed.
+/// Exit code of a program that was allowed to skip a step.
 pub const SKIPPED: u8 = 3;
 
-/// How a step ended.
+/// Result of a step.
 pub enum Outcome {
-    /// As it should.
+    /// Passed.
     Passed,
-    /// It could not be run, which was allowed; why.
+    /// Skipped, with permission; the reason.
     Skipped(String),
     /// What went wrong and how to fix it.
     Failed(String),
 }
 
-/// Steps done so far.
+/// Steps so far.
 pub struct Report {
     start: Instant,
-    /// How many there will be.
+    /// Number of all steps.
     total: usize,
     steps: Vec<(String, Outcome, Duration)>,
 }
 
 impl Report {
-    /// Of so many steps.
+    /// A report of `total` steps.
     #[must_use]
     pub fn new(total: usize) -> Self {
         Self { start: Instant::now(), total, steps: Vec::new() }
     }
 
-    /// Does a step, in view. Later steps are done whether or not it passes.
+    /// Runs a step and shows its output. Later steps run even if it fails.
     pub fn step(&mut self, name: &str, work: impl FnOnce() -> Outcome) {
         let start = Instant::now();
         let gone = clock(start - self.start);
@@ -41,7 +41,7 @@ impl Report {
         self.steps.push((name.to_owned(), outcome, start.elapsed()));
     }
 
-    /// Whether every step passed, none was skipped.
+    /// Whether every step passed, and none was skipped.
     #[must_use]
     pub fn is_whole(&self) -> bool {
         self.steps.iter().all(|(_, outcome, _)| matches!(outcome, Outcome::Passed))
@@ -53,7 +53,7 @@ impl Report {
         self.steps.iter().any(|(_, outcome, _)| matches!(outcome, Outcome::Failed(_)))
     }
 
-    /// Prints one line per step; fails if one failed.
+    /// Prints one line per step; an error code if one failed.
     #[must_use]
     pub fn finish(self) -> ExitCode {
         println!("\n=== {}  summary", clock(self.start.elapsed()));
@@ -76,7 +76,7 @@ pub fn clock(time: Duration) -> String {
     format!("{:2}:{:02}", seconds / 60, seconds % 60)
 }
 
-/// Cargo in the repository, the one that runs this.
+/// A call of cargo in the repository, the same cargo that runs this program.
 #[must_use]
 pub fn cargo(root: &Path, arguments: &[&str]) -> Command {
     let mut command = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
@@ -84,7 +84,7 @@ pub fn cargo(root: &Path, arguments: &[&str]) -> Command {
     command
 }
 
-/// Runs it in view; `fix` says what to do if it fails.
+/// Runs a command and shows its output; `fix` is advice for a failure.
 #[must_use]
 pub fn expect_success(mut command: Command, fix: &str) -> Outcome {
     match command.status() {

@@ -1,20 +1,20 @@
-//! What has to be on the machine before anything can be tested. Cross compiler and QEMU: `maintain setup`.
+//! Tools that the tests need. Cross compiler and QEMU are installed by `maintain setup`.
 
 use crate::run::Outcome;
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-/// The target of microcontrollers.
+/// Target triple of microcontrollers.
 pub const TRIPLE: &str = "thumbv7em-none-eabihf";
-/// Set to `1`, a test that misses a tool fails.
+/// If set to `1`, a test fails if its tool is missing.
 pub const REQUIRE_TOOLS: &str = "SPECGEN_REQUIRE_TOOLS";
-/// Set to `1`, what needs a tool that cannot be installed is skipped, and said so.
+/// If set to `1`, steps that need a tool that cannot be installed are skipped and reported.
 const ALLOW_MISSING: &str = "SPECGEN_ALLOW_MISSING";
 
-/// A part of the Rust toolchain that comes on its own, such as `clippy`; installed if need be.
+/// Installs a component of the Rust toolchain, such as `clippy`, if it is missing.
 ///
 /// # Errors
-/// It is missing, and rustup does not bring it.
+/// It is missing, and rustup cannot install it.
 pub fn component(name: &str, subcommand: &str) -> Result<(), Outcome> {
     let works = || {
         let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
@@ -26,7 +26,7 @@ pub fn component(name: &str, subcommand: &str) -> Result<(), Outcome> {
         return Ok(());
     }
     println!("running: rustup component add {name}");
-    // Whether it helped is asked of cargo itself.
+    // Cargo itself shows whether it helped.
     let _ = Command::new("rustup").args(["component", "add", name]).status();
     if works() {
         return Ok(());
@@ -34,14 +34,14 @@ pub fn component(name: &str, subcommand: &str) -> Result<(), Outcome> {
     Err(missing(format!("{name} is not installed; install it with: rustup component add {name}")))
 }
 
-/// Whether the compiler that cargo takes here has the library of microcontrollers: another one may be the cross compiler.
+/// Whether cargo's own compiler has the library for microcontrollers; the cross compiler may be another one.
 #[must_use]
 pub fn has_target() -> bool {
     let printed = Command::new("rustc").args(["--print", "target-libdir", "--target", TRIPLE]).output();
     printed.is_ok_and(|output| Path::new(String::from_utf8_lossy(&output.stdout).trim()).is_dir())
 }
 
-/// A failure, unless the user allows that something is missing.
+/// A failure, or a skip if the user allows missing tools.
 #[must_use]
 pub fn missing(why: String) -> Outcome {
     if std::env::var_os(ALLOW_MISSING).is_some_and(|value| value == "1") {

@@ -1,29 +1,29 @@
-//! Tests that could not run, or not wholly: seen, counted, and under CI refused unless they are on the list.
+//! Skipped tests and parts of tests: they are shown and counted. Under CI they must be on a list.
 
 use std::path::Path;
 
 use crate::run::Outcome;
 
-/// What a test prints before a number, its name and the reason.
+/// Prefix of a test's message, before a number, its name and the reason.
 const MARK: &str = "skipped ";
-/// The list: a reason a line, as it begins; `#` begins a remark.
+/// The list: a prefix of a reason per line; `#` starts a comment.
 const LIST: &str = "tests/skips.txt";
 
-/// The reasons in what a job printed.
+/// The reasons in the output of a job.
 pub fn of(text: &str) -> Vec<String> {
     let reason = |line: &str| {
-        let (number, said) = line.split_once(MARK)?.1.split_once(": ")?;
+        let (number, message) = line.split_once(MARK)?.1.split_once(": ")?;
         number.parse::<u32>().ok()?;
-        Some(said.split_once(": ")?.1.trim().to_owned())
+        Some(message.split_once(": ")?.1.trim().to_owned())
     };
     let mut reasons: Vec<String> = text.lines().filter_map(reason).collect();
     reasons.dedup();
     reasons
 }
 
-/// Prints them. Under CI, where nobody reads them, one that is not expected fails.
+/// Prints them. Under CI, where nobody reads the output, an unexpected one is a failure.
 pub fn judge(root: &Path, skipped: &[(String, String)]) -> Outcome {
-    println!("\nskipped, wholly or in part:");
+    println!("\nskipped, completely or in part:");
     for (job, reason) in skipped {
         println!("  {job}: {reason}");
     }
@@ -46,7 +46,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_reason_is_found_wherever_it_stands_and_listed_by_its_beginning() {
+    fn a_reason_is_found_anywhere_and_listed_by_its_prefix() {
         let text = "test a ... ok\ntest b ... skipped 1: a::b: no card here\nskipped 2: c: QEMU is missing\nskipped 3: d: QEMU is missing\n\
                     skipped until: now\n";
         assert_eq!(of(text), ["no card here", "QEMU is missing"]);

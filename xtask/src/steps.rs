@@ -1,50 +1,50 @@
-//! What each command does, in order.
+//! The steps of each command, in order.
 
 use std::path::Path;
 use std::process::{Command, ExitCode};
 use std::time::Instant;
 
 use crate::binaries::{self, Binary, Mode, TestResults};
-use crate::judged::Trial;
+use crate::judged::Suite;
 use crate::mutants::Sample;
 use crate::run::{Outcome, Report, SKIPPED, cargo, expect_success};
 use crate::setup::{self, TRIPLE};
 use crate::{fuzz, mutants, packages, results, wheel};
 
-/// Its own workspace, built for another machine.
+/// A workspace for another machine.
 const FIRMWARE: &str = "firmware/qemu/Cargo.toml";
-/// And this one, for the estimate of a board's tick.
+/// A workspace for another machine, which estimates the tick time of boards.
 const TICK: &str = "firmware/tick/Cargo.toml";
 /// Built from an emitted workspace.
 const HOST_LIBRARY: &str = "firmware/host/Cargo.toml";
 /// The emulated board.
 const EMULATED: &str = "tests/board/Cargo.toml";
-/// What they share: built as a part of theirs.
+/// Common code of boards, built with each of them.
 const BOARDS_COMMON: &str = "firmware/stm32/Cargo.toml";
-/// Its own workspace, because of its dependencies.
+/// A separate workspace because of its dependencies.
 const REAL_TIME: &str = "firmware/rt-pc/Cargo.toml";
-/// Workspaces of their own with lock files of their own, beside those of boards.
+/// Separate workspaces with their own lock files, except boards.
 const STANDING_ALONE: [&str; 8] = [FIRMWARE, TICK, REAL_TIME, wheel::MANIFEST, SCHEMA, fuzz::MANIFEST, EMULATED, LOOM];
-/// Every lock file there is, beside those of boards.
+/// All lock files, except those of boards.
 const LOCKED: [&str; 10] =
     ["Cargo.toml", FIRMWARE, TICK, REAL_TIME, wheel::MANIFEST, SCHEMA, fuzz::MANIFEST, EMULATED, LOOM, LINK_PROOF];
-/// The board of one's own beside what is generated, where the test of the boards leaves both.
+/// The example of a user's own board, with a generated workspace, as the test of the boards leaves it.
 const OWN_BOARD: &str = "target/tests/boards/own-board/own-board/Cargo.toml";
-/// Its own workspace, built by a test.
+/// A separate workspace, built by a test.
 const LINK_PROOF: &str = "firmware/link/tests/proof/Cargo.toml";
-/// Its own workspace, because of its dependencies too.
+/// A separate workspace because of its dependencies.
 const SCHEMA: &str = "tests/schema/Cargo.toml";
-/// The published schema under a validator that others wrote.
-const PUBLISHED_SCHEMA: Trial =
-    Trial { manifest: SCHEMA, judges: &[("specs", "schema.json"), ("specs", ".toml"), ("specs/features", ".toml")] };
-/// And this one.
+/// Tests the published schema with a third-party validator.
+const PUBLISHED_SCHEMA: Suite =
+    Suite { manifest: SCHEMA, inputs: &[("specs", "schema.json"), ("specs", ".toml"), ("specs/features", ".toml")] };
+/// A separate workspace because of its dependencies.
 const LOOM: &str = "firmware/rt/tests/loom/Cargo.toml";
-/// What orders memory that two processes share, under a model checker.
-const SHARED_MEMORY: Trial = Trial { manifest: LOOM, judges: &[("firmware/rt/src/exchange", ".rs")] };
-/// Packages that are no members of the workspace, and formatted one by one, beside boards.
+/// Tests the memory ordering between two processes with a model checker.
+const SHARED_MEMORY: Suite = Suite { manifest: LOOM, inputs: &[("firmware/rt/src/exchange", ".rs")] };
+/// Packages outside of the workspace, except boards, which are formatted one by one.
 const FORMATTED_ALONE: [&str; 10] =
     [FIRMWARE, TICK, HOST_LIBRARY, REAL_TIME, wheel::MANIFEST, BOARDS_COMMON, SCHEMA, fuzz::MANIFEST, EMULATED, LOOM];
-/// Members of the workspace that people write.
+/// Hand-written members of the workspace.
 const HAND_WRITTEN: [&str; 24] = [
     "specgen",
     "specgen-cycles",
@@ -72,15 +72,15 @@ const HAND_WRITTEN: [&str; 24] = [
     "xtask",
 ];
 
-/// Members of the workspace that specgen emits and formats.
+/// Members of the workspace that are emitted and formatted by specgen.
 #[cfg(test)]
 const EMITTED: [&str; 2] = ["controller", "controller-with-passes"];
 
-/// The commands and steps that compute with the product: see `tests/src/bin/maintain`.
+/// Call of the program for commands and steps that use the product: see `tests/src/bin/maintain`.
 const MAINTAIN: [&str; 7] =
     ["run", "--release", "--quiet", "--package=specgen-tests", "--bin=maintain", "--locked", "--"];
 
-/// A command of `maintain`.
+/// Runs a command of `maintain`.
 pub fn maintain(root: &Path, words: &[&str]) -> ExitCode {
     match cargo(root, &[&MAINTAIN[..], words].concat()).status() {
         Ok(status) => ExitCode::from(status.code().and_then(|code| u8::try_from(code).ok()).unwrap_or(1)),
@@ -91,7 +91,7 @@ pub fn maintain(root: &Path, words: &[&str]) -> ExitCode {
     }
 }
 
-/// A step of `maintain`, which says why it was left out or failed.
+/// Runs a step of `maintain`, which prints why it was skipped or failed.
 pub fn maintained(root: &Path, words: &[&str]) -> Outcome {
     match cargo(root, &[&MAINTAIN[..], &["step"], words].concat()).status() {
         Ok(status) if status.success() => Outcome::Passed,
@@ -101,7 +101,7 @@ pub fn maintained(root: &Path, words: &[&str]) -> Outcome {
     }
 }
 
-/// A list of manifests with those of boards: the packages in `firmware` whose manifest has the table of a board. Each is its own
+/// Adds the manifests of boards to a list: the packages in `firmware` whose manifest has the table of a board. Each is a separate
 /// workspace, built from an emitted one.
 fn with_boards(root: &Path, manifests: &[&str]) -> Vec<String> {
     let folders = std::fs::read_dir(root.join("firmware")).into_iter().flatten().flatten();
@@ -119,7 +119,7 @@ fn with_boards(root: &Path, manifests: &[&str]) -> Vec<String> {
 /// `cargo xtask test`
 pub fn test(root: &Path) -> ExitCode {
     let before = results::changes(root);
-    // Lints find no wrong result and cost a second pass of the compiler: on a desk, `cargo clippy` and the full run have them.
+    // Lints need a second pass of the compiler, so they run only under CI and in the full run.
     let lints_too = std::env::var_os("CI").is_some();
     let locked = with_boards(root, &LOCKED);
     let mut report = Report::new(9 + usize::from(lints_too) + locked.len());
@@ -132,12 +132,12 @@ pub fn test(root: &Path) -> ExitCode {
         report.step("lints", || lints(root, false));
     }
     report.step("published schema", || PUBLISHED_SCHEMA.unless_unchanged(root));
-    report.step("orders of shared memory", || SHARED_MEMORY.unless_unchanged(root));
+    report.step("shared-memory ordering", || SHARED_MEMORY.unless_unchanged(root));
     report.step("generated files are fresh", || maintained(root, &["check"]));
     for manifest in &locked {
         report.step(&format!("lock file and licences of {manifest}"), || packages::check(root, manifest));
     }
-    report.step("the clone is as it was", || results::unchanged(before.as_deref(), results::changes(root).as_deref()));
+    report.step("the clone is unchanged", || results::unchanged(before.as_deref(), results::changes(root).as_deref()));
     report.finish()
 }
 
@@ -155,10 +155,10 @@ pub fn full(root: &Path) -> ExitCode {
         if root.join(OWN_BOARD).is_file() {
             packages::check(root, OWN_BOARD)
         } else {
-            setup::missing(format!("{OWN_BOARD} is not there; the test of the boards leaves it"))
+            setup::missing(format!("{OWN_BOARD} is missing; the test of the boards creates it"))
         }
     });
-    report.step("tests with every check", || checked(root));
+    report.step("tests with all checks", || checked(root));
     report.step("lints of all packages", || lints(root, true));
     report.step("examples in the documentation", || binaries::examples(root));
     report.step("documentation", || {
@@ -167,7 +167,7 @@ pub fn full(root: &Path) -> ExitCode {
         expect_success(doc, "see the warnings above")
     });
     report.step("published schema", || PUBLISHED_SCHEMA.run_and_keep(root));
-    report.step("orders of shared memory", || SHARED_MEMORY.run_and_keep(root));
+    report.step("shared-memory ordering", || SHARED_MEMORY.run_and_keep(root));
     let (good, tests) = (!report.has_failed(), results::of_tests(&ran, start.elapsed()));
     report.step("result of the full run", || results::write(root, results::FULL, good, &tests));
     report.finish()
@@ -183,7 +183,7 @@ pub fn mutants(root: &Path, sample: &Sample) -> ExitCode {
     report.finish()
 }
 
-/// Debug assertions and overflow checks where they can find something: what runs in every tick or reads what comes from outside.
+/// Tests with debug assertions and overflow checks, for code that runs in every tick or reads external input.
 fn checked(root: &Path) -> Outcome {
     let kernels = ["law", "runtime", "link", "hal", "board", "rt"].map(|name| format!("--package=specgen-{name}"));
     let kernels: Vec<&str> = kernels.iter().map(String::as_str).chain(["--package=host-sim"]).collect();
@@ -200,7 +200,7 @@ fn checked(root: &Path) -> Outcome {
     Outcome::Passed
 }
 
-/// Whether the cross compiler and QEMU are there, installed if need be.
+/// Installs the cross compiler and QEMU if they are missing. Returns whether they are available.
 fn set_up(root: &Path, report: &mut Report) -> bool {
     let mut there = false;
     report.step("cross compiler and QEMU", || {
@@ -211,7 +211,7 @@ fn set_up(root: &Path, report: &mut Report) -> bool {
     there
 }
 
-/// Every test binary; none where they do not compile, which fails.
+/// Compiles the test binaries; none if that fails, which is reported.
 fn compiled(root: &Path, full: bool, report: &mut Report) -> Vec<Binary> {
     let mut binaries = Vec::new();
     report.step("compiling the tests", || match binaries::compile(root, full) {
@@ -231,7 +231,7 @@ pub fn bless(root: &Path) -> ExitCode {
     report.step("generated files", || maintained(root, &["bless"]));
     for manifest in &alone {
         report.step(&format!("lock file of {manifest}"), || {
-            // Keeps the versions that are locked; only the path packages follow their manifests.
+            // Keeps locked versions; only path packages follow their manifests.
             expect_success(cargo(root, &["update", "--workspace", "--manifest-path", manifest]), "see above")
         });
     }
@@ -242,7 +242,7 @@ fn formatting(root: &Path) -> Outcome {
     if let Err(outcome) = setup::component("rustfmt", "fmt") {
         return outcome;
     }
-    // Not `--all`: the emitted controller is formatted by specgen itself.
+    // Not `--all`: specgen itself formats the emitted controller.
     let members = HAND_WRITTEN.iter().flat_map(|name| ["--package", name]);
     let alone = with_boards(root, &FORMATTED_ALONE);
     let excluded = alone.iter().map(|manifest| vec!["--manifest-path", manifest]);
@@ -253,7 +253,7 @@ fn formatting(root: &Path) -> Outcome {
             return outcome;
         }
     }
-    // The board of one's own, whose packages stand beside it only where something was generated.
+    // The example of a user's own board: cargo cannot format it without the generated packages.
     let mut files = Vec::new();
     let folder = "examples/own-board/src";
     if let Err(error) = rust_files(&root.join(folder), &mut files) {
@@ -266,7 +266,7 @@ fn formatting(root: &Path) -> Outcome {
     expect_success(rustfmt, &fix)
 }
 
-/// Every file of Rust below `folder`.
+/// Adds all Rust files below `folder`.
 fn rust_files(folder: &Path, files: &mut Vec<String>) -> std::io::Result<()> {
     for entry in std::fs::read_dir(folder)? {
         let path = entry?.path();
@@ -279,26 +279,25 @@ fn rust_files(folder: &Path, files: &mut Vec<String>) -> std::io::Result<()> {
     Ok(())
 }
 
-/// Of the workspace's libraries, programs and tests; `all`: of its benchmarks and of packages that are not its members, too.
+/// Lints libraries, programs and tests of the workspace; with `all`, also its benchmarks and packages outside of it.
 fn lints(root: &Path, all: bool) -> Outcome {
     if let Err(outcome) = setup::component("clippy", "clippy") {
         return outcome;
     }
-    // In release, so that build scripts and macros are those of the tests. Boards are built from an emitted workspace by their
-    // tests.
+    // In release, to share build scripts and macros with the tests. Boards are linted by their own tests, in an emitted workspace.
     let targets: &[&str] = if all { &["--all-targets"] } else { &["--bins", "--tests"] };
     let own = [&["--workspace"], targets].concat();
-    // Into the same folder: most of its dependencies are those of the workspace.
+    // In the same target folder, because most dependencies are shared.
     let alone = |manifest| ["--manifest-path", manifest, "--all-targets", "--locked", "--target-dir", "target"];
     let mut scopes = vec![own];
     scopes.extend([REAL_TIME, EMULATED].map(alone).iter().filter(|_| all).map(|scope| scope.to_vec()));
-    // Their lints forbid what the optimiser cannot prove away.
+    // These lints forbid panics that the optimiser cannot remove.
     if !all {
-        println!("members of the workspace; the others in the full run");
+        println!("only members of the workspace; the full run checks the others");
     } else if setup::has_target() {
         scopes.extend([FIRMWARE, TICK].map(|manifest| [&alone(manifest)[..], &["--target", TRIPLE]].concat()));
     } else {
-        println!("not looked at: {FIRMWARE} and {TICK}, as rustc here has no {TRIPLE}");
+        println!("not checked: {FIRMWARE} and {TICK}, because rustc has no target {TRIPLE}");
     }
     for scope in scopes {
         let clippy = [&["clippy", "--release", "--quiet"], &scope[..], &["--", "-D", "warnings"]].concat();
@@ -329,10 +328,10 @@ mod tests {
             .collect()
     }
 
-    /// A list that a new package is not added to would leave it out, and say nothing.
+    /// A list that lacks a new package would silently omit it.
     #[test]
     fn no_package_is_left_out_of_a_list() {
-        // By a step of its own; its lock file is looked at where it was generated.
+        // It has its own step; its lock file is checked where it was generated.
         let own_board = "examples/own-board/Cargo.toml";
         let locked: BTreeSet<String> = named("Cargo.lock").iter().map(|path| path.replace(".lock", ".toml")).collect();
         assert_eq!(locked, with_boards(&crate::root(), &LOCKED).into_iter().chain([own_board.to_owned()]).collect());
@@ -341,7 +340,7 @@ mod tests {
         let members = workspace.split_once("members = [").unwrap().1.split_once(']').unwrap().0;
         let members: BTreeSet<String> =
             members.split('"').skip(1).step_by(2).map(|folder| format!("{folder}/Cargo.toml")).collect();
-        // Emitted, so that specgen itself formats it; and a crate of the link's tests.
+        // The emitted controller, which specgen itself formats; and a crate of the link's tests.
         let others = ["Cargo.toml", "firmware/controller/Cargo.toml", LINK_PROOF, own_board];
         let alone =
             named("Cargo.toml").into_iter().filter(|path| !members.contains(path) && !others.contains(&path.as_str()));

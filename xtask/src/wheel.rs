@@ -1,4 +1,4 @@
-//! The Python package: its wheel, built and tried in virtual environments as its users make them.
+//! The Python package: builds its wheel, and tests it in a virtual environment like those of users.
 
 use std::ffi::OsStr;
 use std::fs;
@@ -7,12 +7,12 @@ use std::process::{Command, ExitCode};
 
 use crate::run::{Outcome, Report, cargo, expect_success};
 
-/// Its own workspace: no other build needs Python.
+/// A separate workspace, because no other build needs Python.
 pub const MANIFEST: &str = "codegen/python/Cargo.toml";
 pub const FOLDER: &str = "codegen/python";
-/// Where everything is made.
+/// Output folder.
 const MADE: &str = "target/wheel";
-/// The environment of what builds it.
+/// Virtual environment of the build tools.
 pub const TOOLS: &str = "target/wheel/tools";
 
 /// `cargo xtask wheel`
@@ -27,7 +27,7 @@ pub fn command(root: &Path) -> ExitCode {
     }
     report.step("the command", || expect_success(cargo(root, &["build", "--release", "--locked"]), "see above"));
     report.step("fresh environment", || match wheel(&wheels) {
-        // The versions of the tools, so that the same packages are tried everywhere.
+        // With fixed versions of the test tools, so that results are the same everywhere.
         Ok(wheel) => environment(
             &fresh,
             &[wheel.as_ref(), OsStr::new("-r"), root.join(FOLDER).join("tests/requirements.txt").as_ref()],
@@ -36,7 +36,7 @@ pub fn command(root: &Path) -> ExitCode {
     });
     let python = |arguments: &[&str]| {
         let mut python = Command::new(fresh.join("bin/python"));
-        // Not beside the sources, which would be imported.
+        // Not in the folder of the sources, which would be imported.
         python.current_dir(root).args(arguments);
         python.env("SPECGEN_COMMAND", target(root).join("release/specgen"));
         python
@@ -50,7 +50,7 @@ pub fn command(root: &Path) -> ExitCode {
     report.step("types of the tests", || {
         expect_success(python(&["-m", "mypy", &config, &tests]), "fix what is reported above")
     });
-    report.step("types of what is not Python", || {
+    report.step("types of the native module", || {
         expect_success(python(&["-m", "mypy.stubtest", "specgen"]), "correct codegen/python/specgen/_native.pyi")
     });
     report.step("lints", || {
@@ -63,13 +63,13 @@ pub fn command(root: &Path) -> ExitCode {
     report.finish()
 }
 
-/// A virtual environment, anew, with packages.
+/// Creates a new virtual environment with these packages.
 pub fn environment(folder: &Path, packages: &[&OsStr]) -> Outcome {
     let mut python = Command::new("python3");
     python.args(["-m", "venv", "--clear"]).arg(folder);
     match expect_success(
         python,
-        "python3 from 3.11 on with its module venv is needed (Debian: apt-get install python3-venv)",
+        "python3 3.11 or newer with the module venv is required (Debian: apt-get install python3-venv)",
     ) {
         Outcome::Passed => {}
         other => return other,
@@ -79,7 +79,7 @@ pub fn environment(folder: &Path, packages: &[&OsStr]) -> Outcome {
     expect_success(pip, "see above")
 }
 
-/// Builds it, with what `more` adds to the builder's arguments and environment.
+/// Builds the wheel; `more` can add to the builder's arguments and environment.
 pub fn build(root: &Path, tools: &Path, wheels: &Path, more: impl FnOnce(&mut Command)) -> Outcome {
     if let Err(error) = fs::remove_dir_all(wheels)
         && error.kind() != std::io::ErrorKind::NotFound
@@ -91,20 +91,20 @@ pub fn build(root: &Path, tools: &Path, wheels: &Path, more: impl FnOnce(&mut Co
         .current_dir(root)
         .args(["build", "--release", "--locked", "--manifest-path", MANIFEST, "--out"])
         .arg(wheels);
-    // Most of what it is made of is the command's.
+    // It shares most packages with the command.
     maturin.env("CARGO_TARGET_DIR", target(root));
     more(&mut maturin);
     expect_success(maturin, "see above")
 }
 
-/// The one in a folder.
+/// The wheel in a folder.
 pub fn wheel(folder: &Path) -> Result<PathBuf, String> {
     let entries = fs::read_dir(folder).map_err(|error| format!("{}: {error}", folder.display()))?;
     let mut paths = entries.filter_map(|entry| Some(entry.ok()?.path()));
     paths.find(|path| path.extension() == Some(OsStr::new("whl"))).ok_or_else(|| "there is no wheel".to_owned())
 }
 
-/// Where cargo builds.
+/// Cargo's target folder.
 fn target(root: &Path) -> PathBuf {
     std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| root.join("target"), PathBuf::from)
 }

@@ -1,79 +1,79 @@
-//! What an instruction costs, in cycles of the core: one each, or by a model whose assumptions are these.
+//! Cost of instructions in core cycles: one each, or by a model with these assumptions.
 //!
 //! | what | Cortex-M7 | Cortex-M4 |
 //! |---|---|---|
-//! | integer instruction | 1; goes with a load, store, branch or f32 instruction before it | 1 |
-//! | load, store | 1 a cycle; of several registers two words a cycle | load 2, store 1, of several registers 1 and 1 each |
-//! | branch | goes with what stands before it, and is foreseen | 3 if taken |
+//! | integer instruction | 1; pairs with a preceding load, store, branch or f32 instruction | 1 |
+//! | load, store | 1 per cycle; for several registers, two words per cycle | load 2, store 1; for several registers, 1 + 1 per word |
+//! | branch | pairs with the preceding instruction, and is predicted | 3 if taken |
 //! | integer division | 8 | 8 |
-//! | f32: add, multiply | 1 a cycle, result after 3 | 1 |
-//! | f32: multiply and add; divide, root | result after 6; 16 | 3; 14 |
-//! | f64: add; multiply; both | alone in its cycle, result after 4; 7; 11 | not there |
-//! | f64: divide, root | 30, and nothing else meanwhile | not there |
-//! | result of a load into a floating-point register | after 2 | at once |
-//! | code in flash | lines of 32 bytes, cache of 16 KiB in two ways, LRU; a line that is missing costs 2 (wait states + 8) | lines of 16 bytes; each other line costs the wait states, unless the accelerator's 64 lines have it; one that follows, and is fetched ahead, what is left of them |
-//! | code in ITCM | 0 | not there |
-//! | data in flash | lines of 32 bytes, cache of 16 KiB in four ways, LRU; a line that is missing costs 2 (wait states + 8) | the wait states, unless the accelerator's 8 lines of 16 bytes have it |
+//! | f32: add, multiply | 1 per cycle, latency 3 | 1 |
+//! | f32: multiply-add; divide, square root | latency 6; 16 | 3; 14 |
+//! | f64: add; multiply; multiply-add | not paired, latency 4; 7; 11 | none |
+//! | f64: divide, square root | 30, blocking | none |
+//! | load into a floating-point register | latency 2 | no latency |
+//! | code in flash | lines of 32 bytes, 16 KiB two-way LRU cache; a miss costs 2 (wait states + 8) | lines of 16 bytes; a new line costs the wait states, unless it is in the accelerator's 64 lines; a prefetched next line costs the remaining wait states |
+//! | code in ITCM | 0 | none |
+//! | data in flash | lines of 32 bytes, 16 KiB four-way LRU cache; a miss costs 2 (wait states + 8) | the wait states, unless it is in the accelerator's 8 lines of 16 bytes |
 //! | data in DTCM (F4: SRAM) | 0 | 0 |
-//! | data in AXI SRAM, which no cache keeps: read, write | 16, 4 | not there |
-//! | constants beside the code, in flash | in the data cache | the wait states, unless the accelerator's data cache is on |
-//! | register of a device: read, write | 24, 8 | 6, 3 |
-//! | entering or leaving an exception | 29 | 29 |
+//! | data in AXI SRAM, uncached: read, write | 16, 4 | none |
+//! | literal pool in flash | in the data cache | the wait states, unless the accelerator's data cache is on |
+//! | peripheral register: read, write | 24, 8 | 6, 3 |
+//! | exception entry or return | 29 | 29 |
 //!
-//! Not in it: integer registers that one instruction waits for, branches that are not foreseen, and the DMA on the buses.
-//! Latencies of the M7 are those of LLVM's scheduling model, of the M4 those of its manual.
+//! Not modelled: waits for integer registers, mispredicted branches, and DMA traffic on the buses.
+//! Latencies of the M7 are from LLVM's scheduling model, those of the M4 from its manual.
 
-/// Which family, where cores and registers of peripherals differ.
+/// Family of microcontrollers, for differences of cores and peripherals.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Family {
-    /// Cortex-M7 with double precision, caches: STM32H7.
+    /// Cortex-M7 with double precision and caches: STM32H7.
     H7,
-    /// Cortex-M4F behind a flash accelerator: STM32F4.
+    /// Cortex-M4F with a flash accelerator: STM32F4.
     F4,
 }
 
-/// Lines of the M7's instruction cache: two ways.
+/// Sets of the M7's two-way instruction cache.
 const SETS: usize = 256;
 /// Lines of the F4's accelerator: code, data.
 const LINES: [usize; 2] = [64, 8];
-/// Lines of the M7's data cache: four ways.
+/// Sets of the M7's four-way data cache.
 const DATA_SETS: usize = 128;
-/// Flash of both families; ITCM, flash and AXI SRAM of the H7: address bits from 24 on.
+/// Memory regions by the upper 8 address bits: ITCM (H7), flash (both families), AXI SRAM (H7).
 const ITCM: u32 = 0x00;
 const FLASH: u32 = 0x08;
 const AXI_SRAM: u32 = 0x24;
 
-/// What has been executed so far, as far as it decides about what comes.
+/// State of the cost model.
 #[derive(Debug)]
 pub struct Cost {
     family: Family,
     modelled: bool,
-    /// Issue cycle of the last instruction, and what it was.
+    /// Issue cycle and kind of the last instruction.
     time: u64,
     last: Kind,
-    /// From when on each single register holds its value.
+    /// Cycle at which each single-precision register has its value.
     ready: [u64; 32],
-    /// Where the next instruction is if the last one did not jump.
+    /// Address of the next instruction without a jump.
     follows: u32,
-    /// Lines by set, the one used last first.
+    /// Lines by set, most recently used first.
     ways: [[u32; 2]; SETS],
-    /// Of the F4's accelerator: code, data.
+    /// Lines of the F4's accelerator: code, data.
     lines: [Vec<u32>; 2],
     data_ways: [[u32; 4]; DATA_SETS],
     line: u32,
-    /// When this line was come to.
+    /// Cycle at which the current line was entered.
     entered: u64,
     wait_states: u64,
-    /// Caches of code and of data, or those of the F4's accelerator; whether that fetches ahead.
+    /// Whether the caches of code and data, or those of the F4's accelerator, are on; whether that prefetches.
     cached: [bool; 2],
     ahead: bool,
 }
 
-/// What decides about the issue of the next one.
+/// Kind of an instruction, as far as it affects the issue of the next one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Kind {
     Integer,
-    /// So many words.
+    /// A store, with its number of words.
     Memory(u64),
     Load(u64),
     Branch,
@@ -81,7 +81,7 @@ enum Kind {
     Float(Operation),
 }
 
-/// A floating-point instruction: registers as numbers of single ones, so many for each.
+/// A floating-point instruction; registers are numbered as single-precision ones.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Operation {
     double: bool,
@@ -103,10 +103,10 @@ enum Class {
 }
 
 impl Cost {
-    /// Of stacking or unstacking with floating-point registers.
+    /// Exception entry or return with floating-point registers.
     pub const EXCEPTION: u64 = 29;
 
-    /// Nothing executed yet, caches empty; `modelled`: by the table, else one cycle an instruction.
+    /// The state at reset, with empty caches. `modelled`: costs by the table, otherwise one cycle per instruction.
     #[must_use]
     pub fn new(family: Family, modelled: bool) -> Self {
         Self {
@@ -127,13 +127,13 @@ impl Cost {
         }
     }
 
-    /// Whether it counts by the table.
+    /// Whether costs are by the table.
     #[must_use]
     pub const fn is_modelled(&self) -> bool {
         self.modelled
     }
 
-    /// FLASH_ACR and CCR of the core, as they are now.
+    /// Takes the current values of FLASH_ACR and of the core's CCR.
     pub fn configure(&mut self, access: u32, control: u32) {
         self.wait_states = u64::from(access & 0xf);
         self.cached = match self.family {
@@ -143,7 +143,7 @@ impl Cost {
         self.ahead = self.family == Family::F4 && access >> 8 & 1 == 1;
     }
 
-    /// Of an instruction: its halves, the second where it has one.
+    /// Cost of an instruction, given by its halfwords.
     pub fn of(&mut self, address: u32, size: u32, code: [u32; 2]) -> u64 {
         if !self.modelled {
             return 1;
@@ -180,7 +180,7 @@ impl Cost {
         self.time - before
     }
 
-    /// When an M7 issues it.
+    /// Issues an instruction on an M7.
     fn issue(&mut self, kind: Kind, jumped: bool) {
         let alone = |kind| matches!(kind, Kind::Float(operation) if operation.double && !operation.is_move());
         let pairs = match (self.last, kind) {
@@ -193,7 +193,7 @@ impl Cost {
             (Kind::Float(one), _) | (_, Kind::Float(one)) => !one.is_move(),
             _ => false,
         };
-        // A third one in the same cycle is a cycle later.
+        // At most two instructions per cycle.
         let last = if pairs { Kind::Branch } else { kind };
         self.time += u64::from(!pairs);
         match kind {
@@ -221,7 +221,7 @@ impl Cost {
         self.last = last;
     }
 
-    /// What it costs to get the code at an address.
+    /// Cost of fetching the code at an address.
     fn fetched(&mut self, address: u32) -> u64 {
         match self.family {
             Family::H7 => {
@@ -254,7 +254,7 @@ impl Cost {
         }
     }
 
-    /// Of an access to memory at this address, beyond its instruction.
+    /// Additional cost of a memory access at this address.
     pub fn data(&mut self, address: u32, write: bool) -> u64 {
         let cost = match (self.family, address >> 24) {
             _ if !self.modelled => 0,
@@ -270,7 +270,7 @@ impl Cost {
                     16
                 }
             }
-            // Without its data cache the accelerator's wait states are those of `of`.
+            // Without the accelerator's data cache, `of` adds the wait states.
             (Family::F4, FLASH) if self.cached[1] && !kept(&mut self.lines[1], LINES[1], address >> 4) => {
                 self.wait_states
             }
@@ -280,7 +280,7 @@ impl Cost {
         cost
     }
 
-    /// Words that an instruction writes to memory at most.
+    /// Largest number of words that an instruction writes to memory.
     #[must_use]
     pub fn stored(size: u32, code: [u32; 2]) -> u64 {
         match kind(code, size) {
@@ -290,7 +290,7 @@ impl Cost {
         }
     }
 
-    /// Of an access to a register of a device, beyond its instruction.
+    /// Additional cost of an access to a peripheral register.
     #[must_use]
     pub fn access(&self, write: bool) -> u64 {
         match (self.modelled, self.family, write) {
@@ -303,7 +303,7 @@ impl Cost {
     }
 }
 
-/// Whether one of the ways has this line; it is the one used last from here on.
+/// Whether one of the ways has this line; it becomes the most recently used one.
 fn used<const WAYS: usize>(ways: &mut [u32; WAYS], line: u32) -> bool {
     let at = ways.iter().position(|known| *known == line);
     ways[..=at.unwrap_or(WAYS - 1)].rotate_right(1);
@@ -311,7 +311,7 @@ fn used<const WAYS: usize>(ways: &mut [u32; WAYS], line: u32) -> bool {
     at.is_some()
 }
 
-/// The same of lines of which the least used one is given up when there are `most`.
+/// Whether this line is cached; it becomes the most recently used of at most `most` lines.
 fn kept(lines: &mut Vec<u32>, most: usize, line: u32) -> bool {
     let at = lines.iter().position(|known| *known == line);
     match at {
@@ -327,7 +327,7 @@ impl Operation {
         matches!(self.class, Class::Load | Class::Out)
     }
 
-    /// Of an M7.
+    /// Latency on an M7.
     fn latency(&self) -> u64 {
         match (self.class, self.double) {
             (Class::Add | Class::Multiply, false) => 3,
@@ -385,7 +385,7 @@ fn kind(code: [u32; 2], size: u32) -> Kind {
     }
 }
 
-/// Whether it reads a constant that lies beside the code.
+/// Whether it reads a constant from the literal pool.
 fn beside_code([first, _]: [u32; 2], size: u32) -> bool {
     if size == 2 { first >> 11 == 0x09 } else { matches!(first & 0xff7f, 0xf85f) || first & 0xff3f == 0xed1f }
 }
@@ -422,7 +422,7 @@ fn float(first: u32, second: u32, double: bool) -> Kind {
         2 => operation(Class::Multiply, [left, right, right], Some(target)),
         3 => operation(Class::Add, [left, right, right], Some(target)),
         8 => operation(Class::Long, [left, right, right], Some(target)),
-        // Root, by its number; the rest as an addition of one operand.
+        // Square root, by its opcode; others cost as much as an addition of one operand.
         _ if first & 0xf == 1 && second >> 6 & 3 == 3 => operation(Class::Long, [right; 3], Some(target)),
         _ => operation(Class::Add, [right; 3], Some(target)),
     }
@@ -458,7 +458,7 @@ mod tests {
     const BNE: [u32; 2] = [0xd1fd, 0];
 
     #[test]
-    fn a_loop_of_a_delay_takes_one_cycle_a_turn() {
+    fn a_delay_loop_takes_one_cycle_per_iteration() {
         assert_eq!(cycles(&[SUBS, BNE]), 1);
     }
 
@@ -471,7 +471,7 @@ mod tests {
     }
 
     #[test]
-    fn instructions_are_told_apart() {
+    fn instructions_are_classified() {
         let class = |code| match kind(code, 4) {
             Kind::Float(Operation { class, double, .. }) => Some((class, double)),
             _ => None,
@@ -509,7 +509,7 @@ mod tests {
         assert_eq!([0x20, 0x40, 0x0800_0000, 0x0800_0020, 0x0800_0000].map(&mut fetch), [1, 1, 25, 25, 1]);
         let mut read = |address| cost.data(address, false);
         assert_eq!([0x2000_4000, 0x0800_1000, 0x0800_101c, 0x2400_0000].map(&mut read), [0, 24, 0, 16]);
-        // Four ways: the fifth line of a set takes the place of the first.
+        // Four ways: the fifth line of a set replaces the first.
         for way in 1..=4 {
             assert_eq!(cost.data(0x0800_1000 + 0x1000 * way, false), 24);
         }
@@ -517,13 +517,13 @@ mod tests {
     }
 
     #[test]
-    fn a_line_that_is_fetched_ahead_costs_what_is_left() {
+    fn a_prefetched_line_costs_the_remaining_wait_states() {
         let mut cost = Cost::new(Family::F4, true);
         cost.configure(5 | 7 << 8, 0);
         let run: Vec<u64> = (0..16).map(|k| cost.of(0x0800_0000 + 2 * k, 2, [0xbf00, 0])).collect();
         // Eight instructions take longer than the five wait states.
         assert_eq!((run[0], run[8]), (8, 1));
-        // A jump to a line that is not there.
+        // A jump to a line that is not cached.
         assert_eq!(cost.of(0x0800_0100, 2, [0xbf00, 0]), 8);
     }
 

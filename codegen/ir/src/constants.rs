@@ -1,4 +1,4 @@
-//! Constants of the IR as the runtime takes them, in the scalar of the controller: for the emitted text, and for the law at run time.
+//! Converts constants of the IR to the runtime's types, in the scalar of the controller, for emitted text and for the law at run time.
 
 use specgen_runtime::setpoint::{Axis, MoveLimits, Row, Segment, Setpoints, StopLimits, Trajectory};
 use specgen_runtime::snapshot::Sizes;
@@ -35,7 +35,7 @@ pub fn legs<T: Real>(numbers: &impl Numbers<T>, k: &ir::Kinematics) -> Legs<'sta
     }
 }
 
-/// Where six gauges see the platform.
+/// Geometry of the six gauges of a platform.
 pub fn gauges<T: Real>(numbers: &impl Numbers<T>, sensing: &ir::Sensing) -> Gauges<'static, T> {
     Gauges {
         direction: numbers.matrix(&sensing.direction),
@@ -50,7 +50,7 @@ pub fn gauges<T: Real>(numbers: &impl Numbers<T>, sensing: &ir::Sensing) -> Gaug
     }
 }
 
-/// What the generator of set-points needs to know; poses are within ± `bound`.
+/// Constants of the set-point generator; poses are within ± `bound`.
 pub fn setpoints<T: Real, F>(
     numbers: &impl Numbers<T>,
     bound: &[f64; 6],
@@ -112,14 +112,14 @@ pub fn body<T: Real>(numbers: &impl Numbers<T>, dynamics: &ir::Dynamics) -> Plat
     dynamics.platform_of(|value| numbers.real(value))
 }
 
-/// What a platform's legs give way to first order, if they do.
+/// First-order model of the load of a platform's legs, if it is used.
 pub fn affine<T: Real>(numbers: &impl Numbers<T>, load: &ir::Load) -> Option<Affine<T>> {
     load.affine
         .as_ref()
         .map(|affine| Affine { pose: numbers.matrix(&affine.pose), acceleration: numbers.matrix(&affine.acceleration) })
 }
 
-/// The notch of each mode, if there is one.
+/// The modal notch, if there is one.
 pub fn notch<T: Real>(numbers: &impl Numbers<T>, law: &ir::ControlLaw) -> Option<Notch<T>> {
     law.notch.as_ref().map(|notch| Notch {
         sections: notch
@@ -154,7 +154,7 @@ pub fn rate_filter<T: Real>(numbers: &impl Numbers<T>, sensing: &ir::Sensing) ->
     RateFilter { keep: numbers.real(sensing.rate_keep), gain: numbers.real(sensing.rate_gain) }
 }
 
-/// What each output line shows.
+/// Settings of the output lines.
 pub fn lines<T: Real>(numbers: &impl Numbers<T>, defaults: &ir::PlatformDefaults) -> Vec<Line<T>> {
     let of_line = |line: &ir::Line| Line {
         kind: line.kind,
@@ -172,8 +172,8 @@ pub fn lines<T: Real>(numbers: &impl Numbers<T>, defaults: &ir::PlatformDefaults
     defaults.triggers.iter().map(of_line).collect()
 }
 
-/// Ranges of the settings, each for so many words: those that are alike are in one row. Most gains have one range, and a row for each would
-/// take a kilobyte of flash.
+/// Ranges of the settings, run-length encoded: a range, and its number of words. Most gains have the same range, and a row for each
+/// would take a kilobyte of flash.
 pub fn permitted<T: Real>(numbers: &impl Numbers<T>, table: &ir::PermittedRanges) -> Vec<(PermittedRange<T>, usize)> {
     let ranges: Vec<Range> = table.words().map(|(_, range)| range).collect();
     let of_range = |range| match range {
@@ -184,7 +184,7 @@ pub fn permitted<T: Real>(numbers: &impl Numbers<T>, table: &ir::PermittedRanges
     alike.filter_map(|alike| Some((of_range(*alike.first()?), alike.len()))).collect()
 }
 
-/// How large the numbers of a state may be.
+/// Largest magnitudes of the numbers of a state.
 #[must_use]
 pub fn sizes(ir: &Ir) -> Sizes {
     let s = &ir.permitted.state;
@@ -210,7 +210,7 @@ pub fn sizes(ir: &Ir) -> Sizes {
     }
 }
 
-/// What the supervisor takes for a fault.
+/// Constants of the supervisor.
 pub fn supervision<T: Real>(numbers: &impl Numbers<T>, s: &ir::Supervision) -> supervisor::Supervision<T> {
     let wiring = s.wiring.as_ref().map(|wiring| wiring.constants);
     supervisor::Supervision { wiring, ..s.constants }.of(numbers)

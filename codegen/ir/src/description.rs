@@ -1,4 +1,4 @@
-//! What a controller says of itself: `key=value` lines, lists separated by commas.
+//! A controller's description of itself: `key=value` lines, with lists separated by commas.
 
 use specgen_law::{legs, platform};
 
@@ -39,8 +39,7 @@ pub fn description(ir: &Ir) -> String {
     format!("{about}config_names={settings}\ninput_names={inputs}\noutput_names={outputs}\n{motion}")
 }
 
-/// Where a platform may go, how fast, and in which coordinates: what a host has to know beforehand to say whether a pose can be
-/// reached. Nothing of six legs.
+/// Workspace, speed and coordinates of a platform, with which a host can decide whether a pose can be reached. Empty for six legs.
 fn motion(ir: &Ir) -> String {
     let Some(task) = &ir.task_space else { return String::new() };
     let setpoints = &task.setpoints;

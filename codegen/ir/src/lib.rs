@@ -68,7 +68,7 @@ pub struct Ir {
     pub name: String,
     /// SHA-256 of spec and records, hex.
     pub digest: String,
-    /// What nobody measured: paths of the spec, and simulated files.
+    /// Values that were not measured: paths in the spec, and simulated files.
     pub assumed: Vec<String>,
     /// Version of the compiler.
     pub specgen_version: String,
@@ -82,15 +82,15 @@ pub struct Ir {
     pub hysteresis: Hysteresis,
     /// Converter and limits.
     pub actuation: Actuation,
-    /// What inputs are believed.
+    /// Plausible ranges of inputs.
     pub bounds: Bounds,
     /// Codes of the gauges' converters.
     pub gauge_converter: GaugeConverter,
-    /// What the supervisor takes for a fault.
+    /// Constants of the supervisor.
     pub supervision: Supervision,
     /// Config at start-up.
     pub defaults: Defaults,
-    /// What a Config may hold, and how large the numbers of a state may become.
+    /// Permitted values of a Config, and largest numbers of a state.
     pub permitted: PermittedRanges,
     /// Control in task space; none for six legs with their own gauges.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -181,13 +181,13 @@ pub struct DynamicsLeg {
 }
 
 impl Dynamics {
-    /// As the runtime takes it, in numbers of any kind.
+    /// The runtime's type, in any scalar.
     #[must_use]
     pub fn platform<T: Real>(&self) -> Platform<T> {
         self.platform_of(T::from_f64)
     }
 
-    /// The same with numbers that `number` makes.
+    /// The runtime's type, with numbers converted by `number`.
     #[must_use]
     pub fn platform_of<T: Real>(&self, number: impl Fn(f64) -> T) -> Platform<T> {
         let vector = |values: [f64; 3]| values.map(&number);
@@ -218,7 +218,7 @@ impl Dynamics {
         }
     }
 
-    /// Every number rounded to the scalar, but for the pivot ratio, which is a finding and no constant.
+    /// Rounds all numbers to the scalar, except the pivot ratio, which is a finding and not a constant.
     #[must_use]
     pub fn rounded(mut self, scalar: Scalar) -> Self {
         let round = |value: &mut f64| *value = scalar.round(*value);
@@ -247,10 +247,10 @@ pub struct Hysteresis {
     pub tables: Vec<Vec<f64>>,
     /// Table of each leg.
     pub table_of_leg: [usize; LEGS],
-    /// What accounts for the rate; none in a static model.
+    /// Rate dependence; none in a static model.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rate: Option<RateModel>,
-    /// Lead of the leg displacements asked for; none without a dead time.
+    /// Lead of the demanded leg displacements; none without a dead time.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub lead: Option<Lead>,
 }
@@ -261,14 +261,14 @@ pub struct Hysteresis {
 pub enum RateModel {
     /// (6).
     DynamicPreisach {
-        /// Distinct tables of the second weight, laid out as those of the first, m per cell a tick.
+        /// Distinct tables of the second weight, in the layout of the first, m per cell per tick.
         tables: Vec<Vec<f64>>,
         /// Table of each leg.
         table_of_leg: [usize; LEGS],
-        /// Miss of the demand at which the inverse is found, m.
+        /// Error of the demand at which the inverse has converged, m.
         tolerance: f64,
     },
-    /// Creep behind the static model.
+    /// Creep in series with the static model.
     Creep {
         /// g_j = 1 − e^(−T/τ_j).
         gains: Vec<f64>,
@@ -286,7 +286,7 @@ pub enum RateModel {
 pub struct Lead {
     /// Ticks.
     pub ticks: f64,
-    /// Most that it adds, m.
+    /// Largest addition, m.
     pub limit: f64,
 }
 
@@ -313,7 +313,7 @@ pub struct Actuation {
     pub voltage: [f64; 2],
 }
 
-/// What inputs are believed; anything else is a fault.
+/// Plausible ranges of inputs; anything else is a fault.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Bounds {
     /// |pose component| from rest: m ×3, rad ×3.
@@ -322,7 +322,7 @@ pub struct Bounds {
     pub leg: [f64; 2],
     /// Gauge reading, m.
     pub sensor: [f64; 2],
-    /// What every leg can do, m; for hosts, which the controller tells it.
+    /// Stroke of every leg, m; only for hosts, through the controller's description.
     pub stroke: f64,
 }
 
@@ -335,7 +335,7 @@ pub struct GaugeConverter {
     pub per_code: f64,
     /// Highest code.
     pub highest: i32,
-    /// Below and above what is believed.
+    /// Values just below and above the plausible range.
     pub beyond: [f64; 2],
 }
 
@@ -362,7 +362,7 @@ pub struct Defaults {
     pub leg_gain: f64,
 }
 
-/// What the controller checks itself by.
+/// Data of the controller's self-check.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Integrity {
     /// Compiler, platform and spec in one line, kept in every image.
@@ -379,7 +379,7 @@ fn in_lower_case<S: Serializer>(choice: &impl core::fmt::Debug, serializer: S) -
     serializer.serialize_str(&format!("{choice:?}").to_lowercase())
 }
 
-/// Words in hexadecimal: as numbers, readers that know `f64` alone would round them.
+/// Words in hexadecimal; readers that only support `f64` would round numbers.
 fn as_hex<S: Serializer>(words: &[u64], serializer: S) -> Result<S::Ok, S::Error> {
     serializer.collect_seq(words.iter().map(|word| format!("{word:#x}")))
 }

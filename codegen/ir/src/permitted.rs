@@ -1,4 +1,4 @@
-//! What settings may be and how large the numbers of a state may become: one table for the emitted `Config`, its snapshots and
+//! Permitted ranges of settings, and largest numbers of a state: one table for the emitted `Config`, its snapshots and
 //! `docs/settings.md`.
 
 use serde::Serialize;
@@ -10,27 +10,27 @@ use super::LEGS;
 pub struct PermittedRanges {
     /// In the order of the emitted `CONFIG_NAMES`.
     pub settings: Vec<Setting>,
-    /// Numbers of a state that settings and gauges decide about.
+    /// Largest numbers of a state that depend on settings and gauges.
     pub state: State,
 }
 
-/// One setting, or six of a kind.
+/// One setting, or six of one kind.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Setting {
-    /// Name; of six, without the index.
+    /// Name, without the index of six.
     pub name: &'static str,
-    /// Whether there are six of it.
+    /// Whether there are six.
     pub six: bool,
-    /// Number of the output line that it is of.
+    /// Number of its output line.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub line: Option<usize>,
-    /// Unit; empty without dimension. Of six, that of the first three and of the others.
+    /// Unit, empty if dimensionless: of the first three, and of the last three.
     pub unit: [&'static str; 2],
-    /// Least and largest value, of the first three and of the others.
+    /// Range of the first three, and of the last three.
     pub range: [Range; 2],
-    /// What it is.
+    /// Documentation.
     pub doc: &'static str,
-    /// Where the bounds come from.
+    /// Origin of the bounds.
     pub from: &'static str,
 }
 
@@ -38,9 +38,9 @@ pub struct Setting {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Range {
-    /// Of a choice, a count or a code.
+    /// A choice, a count or a code.
     Whole(i32, i32),
-    /// Of a number.
+    /// A number.
     Number(f64, f64),
 }
 

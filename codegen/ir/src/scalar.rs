@@ -1,4 +1,4 @@
-//! Numbers in the scalar of a controller, and constants that the IR holds as the runtime has them.
+//! Numbers in the scalar of a controller, and constants that the IR holds in the runtime's types.
 
 use std::marker::PhantomData;
 
@@ -7,13 +7,13 @@ use serde::{Serialize, Serializer};
 use specgen_language::model::FaultAction;
 use specgen_runtime::{Real, supervisor};
 
-/// Makes numbers of a scalar.
+/// Converts numbers to a scalar.
 pub trait Numbers<T: Real> {
     /// The number rounded to the scalar.
     #[track_caller]
     fn real(&self, value: f64) -> T;
 
-    /// Each of them.
+    /// Converts an array.
     #[track_caller]
     fn vector<const N: usize>(&self, values: &[f64; N]) -> [T; N] {
         let mut converted = [T::ZERO; N];
@@ -23,7 +23,7 @@ pub trait Numbers<T: Real> {
         converted
     }
 
-    /// Each of them; they stay in memory.
+    /// Converts a slice, which stays in memory.
     #[track_caller]
     fn slice(&self, values: &[f64]) -> &'static [T] {
         let mut converted = Vec::with_capacity(values.len());
@@ -33,7 +33,7 @@ pub trait Numbers<T: Real> {
         kept(converted)
     }
 
-    /// Each of each row.
+    /// Converts a matrix.
     #[track_caller]
     fn matrix<const M: usize, const N: usize>(&self, rows: &[[f64; N]; M]) -> [[T; N]; M] {
         let mut converted = [[T::ZERO; N]; M];
@@ -44,12 +44,12 @@ pub trait Numbers<T: Real> {
     }
 }
 
-/// What stays in memory to the end of the process.
+/// Leaks values, which stay in memory to the end of the process.
 pub fn kept<X>(values: impl IntoIterator<Item = X>) -> &'static [X] {
     Box::leak(values.into_iter().collect())
 }
 
-/// Rounds.
+/// A converter that only rounds.
 #[derive(Debug)]
 pub struct Rounding<T>(pub PhantomData<T>);
 
@@ -59,23 +59,23 @@ impl<T: Real> Numbers<T> for Rounding<T> {
     }
 }
 
-/// Constants that the IR holds as the runtime has them, in `f64`.
+/// A constant that the IR holds in the runtime's type, in `f64`.
 pub trait Constant {
-    /// The same in a scalar.
+    /// Its type in a scalar.
     type In<T: Real>;
 
-    /// Its numbers as `numbers` makes them.
+    /// Converts its numbers.
     #[track_caller]
     fn of<T: Real>(&self, numbers: &impl Numbers<T>) -> Self::In<T>;
 
-    /// Writes it as the text of the IR has it.
+    /// Serializes it for the text of the IR.
     ///
     /// # Errors
     /// Those of the serializer.
     fn write<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error>;
 }
 
-/// A constant that is written.
+/// Serializes a constant.
 #[derive(Debug)]
 pub struct Written<'a, C>(pub &'a C);
 
@@ -121,7 +121,7 @@ impl<C: Constant> Constant for Option<C> {
     }
 }
 
-/// What is the same in every scalar.
+/// Constants that are the same in every scalar.
 macro_rules! without_numbers {
     ($($of:ty, $written:expr;)+) => {$(
         impl Constant for $of {

@@ -1,4 +1,4 @@
-//! The supervisor: the runtime's own constants, and what a controller and its hosts need beside them.
+//! The supervisor: the runtime's constants, and others for controller and hosts.
 
 use std::ops::Deref;
 
@@ -12,44 +12,44 @@ use super::scalar::{Constant, Written};
 /// The supervisor.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Supervision {
-    /// As the runtime has them, but for the wiring check, which is none here.
+    /// The runtime's constants, without the wiring check.
     pub constants: supervisor::Supervision<f64>,
-    /// How the legs stand at rest; none at the lowest voltage, where every history is forgotten.
+    /// State of the legs at rest; none if rest is the lowest voltage, which erases the history.
     pub risen: Option<Rest>,
     /// Ticks without a request over a link after which its host is lost.
     pub host_ticks: u32,
-    /// Missed ticks in a row of which more are a fault.
+    /// Largest number of consecutive missed ticks without a fault.
     pub stall_ticks: u32,
-    /// The wiring check; none where the spec switches it off.
+    /// The wiring check; none if the spec switches it off.
     pub wiring: Option<Wiring>,
-    /// Reading of each gauge (rows) per leg displacement (columns); none where each leg has its own gauge.
+    /// Reading of each gauge (rows) per leg displacement (columns); none if each leg has its own gauge.
     pub readings_per_leg: Option<[[f64; 6]; LEGS]>,
-    /// What is left of the way to the set-point after a tick, where there is no generator.
+    /// Without a set-point generator: remaining fraction of the distance to the set-point after a tick.
     pub approach_keep: f64,
 }
 
-/// The wiring check, and what hosts say of findings.
+/// The wiring check, and data with which hosts explain its findings.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Wiring {
-    /// As the runtime has them.
+    /// The runtime's constants.
     #[serde(flatten, serialize_with = "Constant::write")]
     pub constants: supervisor::Wiring<f64>,
-    /// Sets of single faults that look alike on this geometry, as words of [`specgen_runtime::supervisor::Finding`].
+    /// Sets of single faults that cannot be distinguished on this geometry, as words of [`specgen_runtime::supervisor::Finding`].
     pub alike: Vec<Vec<u32>>,
-    /// Single faults that the check lets pass, as such words.
+    /// Single faults that the check cannot detect, as such words.
     pub unseen: Vec<u32>,
-    /// Places by which the connectors of gauges and of legs may be turned at once without the check seeing it.
+    /// Simultaneous rotations of the connectors of gauges and of legs that the check cannot detect.
     pub turned: Vec<[usize; 2]>,
 }
 
-/// The legs at rest above the lowest voltage, risen to it from there.
+/// The legs at rest above the lowest voltage, after a rise from there.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Rest {
     /// Cells of the Everett grid.
     pub drive: f64,
     /// E(`drive`, 0) of each leg, m.
     pub displacement: [f64; LEGS],
-    /// The same of the second weight of (6), m per cell a tick; zero in other models.
+    /// The same with the second weight of (6), m per cell per tick; zero in other models.
     pub rate: [f64; LEGS],
 }
 
@@ -70,13 +70,13 @@ impl Deref for Wiring {
 }
 
 impl Supervision {
-    /// Sets of faults that look alike to the wiring check; none where there is no check.
+    /// Sets of faults that the wiring check cannot distinguish; empty without a check.
     #[must_use]
     pub fn alike(&self) -> &[Vec<u32>] {
         self.wiring.as_ref().map_or(&[], |wiring| &wiring.alike)
     }
 
-    /// Writes what stands behind a constant.
+    /// Writes the entries that follow a constant.
     fn write_behind<M: SerializeMap>(&self, constant: &str, map: &mut M) -> Result<(), M::Error> {
         match (constant, &self.risen, &self.wiring) {
             ("rest", Some(risen), _) => map.serialize_entry("risen", risen),

@@ -1,4 +1,4 @@
-//! What a controller in task space has beyond one of six legs.
+//! Additional constants of a controller in task space.
 
 use serde::Serialize;
 use specgen_runtime::trigger;
@@ -14,23 +14,22 @@ pub struct TaskSpace {
     pub setpoints: Setpoints,
     /// Constants of the control law.
     pub law: ControlLaw,
-    /// How the load of the legs is computed.
+    /// Computation of the load of the legs.
     pub load: Load,
     /// Config at start-up.
     pub defaults: PlatformDefaults,
 }
 
-/// The load p of the legs under motion and gravity, (7), where no interaction force is fed forward.
+/// The load p of the legs under motion and gravity, (7), without feed-forward of an interaction force.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Load {
-    /// To first order; none: by the whole kernel.
+    /// First-order model; none to use the full kernel.
     pub affine: Option<Affine>,
-    /// Largest error permitted within the limits of moves and trajectories, m of a leg.
+    /// Largest permitted error within the limits of moves and trajectories, m of a leg.
     pub tolerance: f64,
-    /// What is proven of the first order: for moves and trajectories; for stops from any declared speed; for whatever a stream may
-    /// state.
+    /// Proven bounds of the first-order model: for moves and trajectories; for stops from any declared speed; for any stream.
     pub bounds: [LoadBound; 3],
-    /// Operations of the whole kernel and of the first order.
+    /// Operations of the full kernel and of the first-order model.
     pub operations: [usize; 2],
 }
 
@@ -51,7 +50,7 @@ impl Affine {
     }
 }
 
-/// No motion of a set takes a leg further.
+/// Bounds over a set of motions.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct LoadBound {
     /// Largest rate of each coordinate, m/s and rad/s.
@@ -60,7 +59,7 @@ pub struct LoadBound {
     pub acceleration: [f64; 6],
     /// |p|, m.
     pub load: f64,
-    /// What the first order leaves of it, m.
+    /// Error of the first-order model, m.
     pub error: f64,
 }
 
@@ -87,12 +86,12 @@ pub struct ControlLaw {
     pub wrench_limit: [f64; 6],
     /// Lead of the leg displacements, in periods; zero if there is none.
     pub lead: f64,
-    /// That of each trajectory, if one has its own; else empty.
+    /// Lead of each trajectory, if one has its own; otherwise empty.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub own_leads: Vec<f64>,
-    /// Part of the transfer offset left after a tick.
+    /// Remaining fraction of the transfer offset after a tick.
     pub transfer_keep: f64,
-    /// Transfer offset that is as good as none, m.
+    /// Negligible transfer offset, m.
     pub transfer_negligible: f64,
     /// Drive of mode P, cells of the Everett grid per metre.
     pub cells_per_metre: f64,
@@ -140,12 +139,12 @@ pub struct Resonator {
     pub a: [f64; 2],
 }
 
-/// How far and how fast the correction of an axis goes.
+/// Limits of the correction of an axis.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct CorrectionLimit {
     /// m or rad.
     pub most: f64,
-    /// m or rad in a tick.
+    /// m or rad per tick.
     pub step: f64,
 }
 
@@ -180,7 +179,7 @@ pub struct PlatformDefaults {
     /// Run-to-run law of F and P/F.
     #[serde(serialize_with = "in_lower_case")]
     pub law: Law,
-    /// Where the interaction force comes from.
+    /// Source of the interaction force.
     #[serde(serialize_with = "in_lower_case")]
     pub interaction: Interaction,
     /// ω or ω1 per tick.
@@ -203,7 +202,7 @@ pub struct PlatformDefaults {
     pub input: bool,
 }
 
-/// What an output line shows; the constants of `specgen_runtime::trigger::Line`, where each is explained.
+/// An output line; the constants of `specgen_runtime::trigger::Line`, where each is explained.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Line {
     /// A word of `specgen_runtime::trigger::Kind`.
@@ -246,7 +245,7 @@ pub struct Sensing {
     pub normal: [[f64; 3]; 6],
     /// m × n of each gauge.
     pub skew: [[f64; 3]; 6],
-    /// c of each gauge: where its line pierces the plane at rest, {P}, m.
+    /// c of each gauge: intersection of its line with the plane at rest, {P}, m.
     pub pierced: [[f64; 3]; 6],
     /// J⁻¹ at rest: pose coordinates (rows) per reading (columns), m/m and rad/m.
     pub inverse: [[f64; 6]; 6],
@@ -254,7 +253,7 @@ pub struct Sensing {
     pub curvature: [[f64; 6]; 6],
     /// Passes after the first guess.
     pub passes: u32,
-    /// What the passes leave over the accepted poses, in exact arithmetic: m, rad.
+    /// Remaining error of the passes over the accepted poses, in exact arithmetic: m, rad.
     pub remainder: [f64; 2],
     /// Coefficients of asin x / x in x² after the leading 1.
     pub arc_sine: Vec<f64>,
@@ -262,7 +261,7 @@ pub struct Sensing {
     pub arc_tangent: Vec<f64>,
     /// Polynomial of each gauge from its raw word to m, lowest power first, all of one length; none: the words are m.
     pub calibration: Option<[Vec<f64>; 6]>,
-    /// Raw words that are believed, per gauge, in the unit of the word.
+    /// Plausible range of the raw words of each gauge, in the unit of the word.
     pub raw_limits: [[f64; 2]; 6],
     /// exp(−ω_c T) of the rate filter.
     pub rate_keep: f64,
@@ -283,7 +282,7 @@ pub struct Setpoints {
     pub bias: [f64; 6],
     /// The user's coordinates of the bias, m and rad.
     pub home: [f64; 6],
-    /// V: largest speed of moves, m/s and rad/s; for hosts, which the controller tells it.
+    /// V: largest speed of moves, m/s and rad/s; only for hosts, through the controller's description.
     pub speed: [f64; 6],
     /// 1/(V T_s) of moves, 1/m and 1/rad.
     pub speed_limit: [f64; 6],
@@ -321,16 +320,16 @@ pub enum Frames {
     Tool {
         /// In {P}, m.
         point: [f64; 3],
-        /// Largest angle that is meant, rad.
+        /// Largest permitted angle, rad.
         largest_angle: f64,
     },
-    /// Rotations about a tool point, along axes of its own.
+    /// Rotations about a tool point, along separate axes.
     Work {
         /// Columns are the axes in {B}.
         axes: [[f64; 3]; 3],
         /// In {P}, m.
         point: [f64; 3],
-        /// Largest angle that is meant, rad.
+        /// Largest permitted angle, rad.
         largest_angle: f64,
     },
 }
@@ -340,7 +339,7 @@ pub enum Frames {
 pub struct Trajectory {
     /// Its name in the spec.
     pub name: String,
-    /// What it is.
+    /// Its poses over time.
     pub path: Path,
 }
 
@@ -379,7 +378,7 @@ pub enum Path {
 /// Line and growing sinusoid on every axis; w = 0..1 over the segment.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Segment {
-    /// Tick at which it begins.
+    /// Its first tick.
     pub first: u32,
     /// w per tick.
     pub per_tick: f64,
@@ -418,7 +417,7 @@ pub struct Row {
 }
 
 impl Frames {
-    /// With every constant rounded to `scalar`.
+    /// Rounds all constants to `scalar`.
     #[must_use]
     pub fn rounded(&self, scalar: Scalar) -> Self {
         let round = |value: f64| scalar.round(value);
@@ -437,7 +436,7 @@ impl Frames {
 }
 
 impl Path {
-    /// Where it begins, as the controller has it, in the user's coordinates, m and rad.
+    /// Its start in the controller, in the user's coordinates, m and rad.
     #[must_use]
     pub fn start(&self) -> [f64; 6] {
         match self {
@@ -446,7 +445,7 @@ impl Path {
         }
     }
 
-    /// Ticks from its start to its end; of one that repeats, of one repetition.
+    /// Ticks from start to end, or of one repetition.
     #[must_use]
     pub fn ticks(&self) -> u32 {
         match self {
@@ -455,13 +454,13 @@ impl Path {
         }
     }
 
-    /// Whether it begins again at its end.
+    /// Whether it repeats.
     #[must_use]
     pub fn repeats(&self) -> bool {
         matches!(self, Self::Table { repeat: true, .. })
     }
 
-    /// With every constant rounded to `scalar`.
+    /// Rounds all constants to `scalar`.
     #[must_use]
     pub fn rounded(mut self, scalar: Scalar) -> Self {
         let round = |value: &mut f64| *value = scalar.round(*value);

@@ -1,4 +1,4 @@
-//! The loop that `Controller.run` is held against: ticks of a host library over rows of words, in Rust.
+//! Baseline for `Controller.run`: ticks of a host library over rows of words, in Rust.
 //!
 //! `rust_loop LIBRARY ROWS REPEATS` prints the shortest time of all rows, s, and the digest of the state after them. `tests/speed.py`
 //! runs it.
@@ -12,7 +12,7 @@ use host_sim::controller::{Controller, TickController};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let [library, rows, repeats] = &arguments[..] else { return Err("LIBRARY ROWS REPEATS are expected".into()) };
+    let [library, rows, repeats] = &arguments[..] else { return Err("expected LIBRARY ROWS REPEATS".into()) };
     let bytes = fs::read(rows)?;
     let words: Vec<u64> = bytes.as_chunks().0.iter().map(|word| u64::from_le_bytes(*word)).collect();
     let mut controller = Controller::load(Path::new(library))?;

@@ -1,4 +1,4 @@
-"""specgen: one description of a piezo-driven Stewart platform in, its controller out.
+"""specgen compiles a description of a piezo-driven Stewart platform to its controller.
 
 >>> import specgen
 >>> compiled = specgen.compile("platform.toml")
@@ -6,7 +6,7 @@
 >>> rows = law.run(numpy.zeros(1000, law.inputs))
 >>> specgen.simulate("platform.toml", frequency=10)["motions"]
 
-Only exports and ``controller(…, emitted=True)`` need ``cargo``: everything else builds nothing.
+Only exports and ``controller(…, emitted=True)`` need ``cargo``; nothing else is built.
 """
 
 from ._commands import (

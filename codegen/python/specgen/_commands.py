@@ -1,4 +1,4 @@
-"""The commands of specgen as functions. Each gives what the command of the same name gives, to the last digit."""
+"""The commands of specgen as functions, with exactly the same results."""
 
 from __future__ import annotations
 
@@ -21,23 +21,23 @@ Progress: TypeAlias = bool | Callable[[str], object]
 
 
 def command(*arguments: str | PathLike[str], progress: Progress = False) -> Result:
-    """Runs ``specgen ARGUMENTS`` in this process, as ``command("tune", "platform.toml", "--evaluations", "50")``.
+    """Runs ``specgen ARGUMENTS`` in this process, such as ``command("tune", "platform.toml", "--evaluations", "50")``.
 
-    The interpreter is free meanwhile. ``progress`` is called with each line of progress; True prints them to standard error.
+    It releases the interpreter. ``progress`` is called with each line of progress; True prints them to standard error.
 
-    Raises `Refused`, `UsageError`, `Unavailable`, `EndedEarly`, `Interrupted` (with what was found so far) or KeyboardInterrupt. A figure beyond
-    its limit raises nothing: `Result.passed` is then False.
+    Raises `Refused`, `UsageError`, `Unavailable`, `EndedEarly`, `Interrupted` (with the result so far) or KeyboardInterrupt. If a figure
+    exceeds its limit, nothing is raised, and `Result.passed` is False.
     """
     return result_of(json.loads(_native.call([fspath(argument) for argument in arguments], listener(progress))))
 
 
 def listener(progress: Progress) -> Callable[[str], object] | None:
-    """What takes lines of progress."""
+    """The function for lines of progress, if any."""
     return progress if callable(progress) else _print if progress else None
 
 
 def result_of(document: dict[str, Any]) -> Result:
-    """The result of a command's document, or why there is none is raised."""
+    """The result of a command's document; an error is raised."""
     findings, error, data = findings_of(document), document["error"], document["result"]
     match document["exit_code"], data:
         case 0, _:
@@ -65,7 +65,7 @@ def _print(line: str) -> None:
 
 
 def _options(**given: object) -> list[str]:
-    """Options of a command line: None and False are left out, sequences are joined by commas."""
+    """Options of a command line: None and False are omitted, sequences are joined by commas."""
     arguments = []
     for name, value in given.items():
         option = "--" + name.replace("_", "-")
@@ -74,7 +74,7 @@ def _options(**given: object) -> list[str]:
         elif isinstance(value, Sequence) and not isinstance(value, str):
             arguments.append(f"{option}={','.join(map(str, value))}")
         elif value is not None and value is not False:
-            # With `=`: a value may begin with a dash.
+            # With `=`, because a value may start with a dash.
             arguments.append(f"{option}={fspath(value) if isinstance(value, PathLike) else value}")
     return arguments
 
@@ -90,18 +90,18 @@ class Compiled:
     def __init__(self, spec: StrPath, checked: Result) -> None:
         self.spec = Path(spec)
         self.checked = checked
-        """All that ``specgen check --details --json`` has."""
+        """The result of ``specgen check --details --json``."""
         self.findings = checked.findings
         """Warnings and notes."""
 
     @property
     def name(self) -> str:
-        """Of the spec."""
+        """Name of the spec."""
         return str(self.checked["name"])
 
     @property
     def digest(self) -> str:
-        """Of the spec with its records, hexadecimal."""
+        """Digest of the spec and its records, hexadecimal."""
         return str(self.checked["digest"])
 
     @property
@@ -111,24 +111,24 @@ class Compiled:
 
     @property
     def passed(self) -> bool:
-        """Whether no figure is beyond its limit, such as the noise of the pose at rest."""
+        """Whether all figures, such as the noise of the pose at rest, are within their limits."""
         return self.checked.passed
 
     @property
     def assumed(self) -> list[str]:
-        """What nobody measured: paths of the spec's values, and files of simulated records."""
+        """Values that were not measured: paths in the spec, and files of simulated records."""
         assumed = self.verdict["assumed"]
         return [*assumed["values"], *assumed["simulated"]]
 
     @property
     def margins(self) -> list[dict[str, Any]]:
-        """Stability: of the closed loops over the platform's modes, law by law; of six legs with their own gauges, the one of the spec."""
+        """Stability margins: for a platform, of each control mode; for six legs with their own gauges, of the spec's."""
         design = self.design
         return [self.checked["margins"]] if design is None else list(design["margins"])
 
     @property
     def design(self) -> dict[str, Any] | None:
-        """With ``[control]``: modes, notch, gains, what limits them."""
+        """With ``[control]``: modes, notch, gains and their limits."""
         design: dict[str, Any] | None = self.checked["design"]
         return design
 
@@ -141,7 +141,7 @@ class Compiled:
         return found.data
 
     def controller(self, *, supervised: bool = False) -> Controller:
-        """The controller, as `controller` makes it."""
+        """The controller, as from `controller`."""
         built = controller(self.spec, supervised=supervised)
         if built.digest != self.digest:
             raise Error(f"{self.spec} has changed since it was compiled; compile it again")
@@ -152,9 +152,9 @@ class Compiled:
 
 
 def compile(spec: StrPath, *, deny_warnings: bool = False) -> Compiled:
-    """Compiles a spec: every check, every constant; writes and builds nothing.
+    """Compiles a spec, with all checks and constants. It writes and builds nothing.
 
-    Raises `Refused`, with the findings, if an error is among them; with ``deny_warnings`` also if a warning is.
+    Raises `Refused`, with the findings, if there is an error, or with ``deny_warnings`` a warning.
     """
     return Compiled(spec, command("check", spec, "--details", *_options(deny_warnings=deny_warnings)))
 
@@ -162,44 +162,44 @@ def compile(spec: StrPath, *, deny_warnings: bool = False) -> Compiled:
 def controller(
     spec: StrPath, *, supervised: bool = False, emitted: bool = False, progress: Progress = False
 ) -> Controller:
-    """The controller of a spec: the law on the constants of the compiled spec; nothing is built.
+    """The controller of a spec: the law with the constants of the compiled spec, without a build.
 
-    With ``emitted`` the emitted crate is built for this computer and loaded, which needs ``cargo`` or a build that was kept. Both have
-    the same bits; a tick of the emitted one takes half as long.
+    With ``emitted``, the emitted crate is built for this computer and loaded, which needs ``cargo`` or a cached build. Both give the
+    same bits; a tick of the emitted one takes half as long.
     """
     if not emitted:
         try:
             return Controller._of_spec(spec, supervised)
         except Error:
-            # A spec that is refused is, with its findings.
+            # Raises `Refused` with the findings if the spec is refused.
             command("check", spec, progress=progress)
             raise
     with tempfile.TemporaryDirectory(prefix="specgen-python-") as folder:
         files = command("export", "c", spec, "-o", Path(folder, "c"), progress=progress)["files"]
         library = next(name for name in files if not name.endswith((".h", ".c")))
-        # What is loaded stays, whatever becomes of the file.
+        # The library stays loaded after its file is removed.
         return Controller(Path(folder, "c", library), supervised=supervised)
 
 
 def export_c(spec: StrPath, output: StrPath) -> list[Path]:
-    """Writes header, library and sources for programs in C to the folder ``output``; `Controller` loads the library, where no
-    ``cargo`` is, too."""
+    """Writes header, library and sources for programs in C to the folder ``output``. `Controller` can load the library, without
+    ``cargo``."""
     return [Path(output, name) for name in command("export", "c", spec, "-o", output)["files"]]
 
 
 def export_python(spec: StrPath, output: StrPath) -> list[Path]:
-    """Writes the library and ``controller.py``, which steps it in any Python, without this package or numpy."""
+    """Writes the library and ``controller.py``, which steps it without this package or numpy."""
     return [Path(output, name) for name in command("export", "python", spec, "-o", output)["files"]]
 
 
 def export_fmu(spec: StrPath, output: StrPath, *, plant: bool = False, progress: Progress = False) -> list[Path]:
-    """Writes FMI 2.0 units for Simulink, Dymola, OMSimulator: of the controller, with ``plant`` of the simulated machine, too."""
+    """Writes FMI 2.0 units for Simulink, Dymola, OMSimulator: the controller and, with ``plant``, the simulated machine."""
     exported = command("export", "fmu", spec, "-o", output, *_options(plant=plant), progress=progress)
     return [Path(unit["file"]) for unit in exported["units"]]
 
 
 class Simulation(Result):
-    """`simulate`; `traces` has every tick of every run by the name of the run, if they were asked for."""
+    """Result of `simulate`; `traces` has every tick of every run by the name of the run, if requested."""
 
     traces: dict[str, Table]
 
@@ -218,18 +218,18 @@ def simulate(
     traces: bool = False,
     progress: Progress = False,
 ) -> Simulation:
-    """Runs the controller against the simulated machine of a spec: ``specgen sim``.
+    """Runs the controller on the simulated machine of a spec: ``specgen sim``.
 
     Args:
-        trajectory: Of the spec, to be played alone; without it rest, waves, and every trajectory.
-        frequency: Of the waves, Hz; 1 and 10 if not given.
-        latency: Control intervals by which voltages reach the amplifiers late.
+        trajectory: Play only this trajectory of the spec; otherwise rest, waves, and every trajectory.
+        frequency: Frequency of the waves, Hz; 1 and 10 if not given.
+        latency: Extra delay from controller to amplifiers, in control intervals.
         samples: Without ``[control]``, control ticks per period of the motion.
-        paper: The paper's experiments instead.
-        plant: Shape of the legs' hysteresis: ``plays``, ``bouc-wen``, or a file of leg parameters.
-        noise: Whether gauges and amplifiers have any.
-        seed: Of noise and tolerances.
-        traces: Whether every tick is kept.
+        paper: Run the paper's experiments instead.
+        plant: Hysteresis model of the legs: ``plays``, ``bouc-wen``, or a file of leg parameters.
+        noise: Whether to simulate noise of gauges and amplifiers.
+        seed: Seed of noise and tolerances.
+        traces: Whether to return every tick.
     """
     with tempfile.TemporaryDirectory(prefix="specgen-python-") as folder:
         tables = Path(folder, "sim")
@@ -252,12 +252,12 @@ def simulate(
     return simulation
 
 
-# Of `sim`, beside the traces.
+# Tables of `sim`, which are not traces.
 _TABLES = ("motions.csv", "tracking.csv", "free-motion.csv", "machining.csv", "linearity.csv")
 
 
 class Robustness(Result):
-    """`robust`; `runs` has a row for each machine."""
+    """Result of `robust`; `runs` has a row for each machine."""
 
     runs: Table
 
@@ -279,20 +279,20 @@ def robust(
     seed: int = 1,
     progress: Progress = False,
 ) -> Robustness:
-    """Tries the closed loop on corners and random draws of declared uncertainties: ``specgen robust``.
+    """Tests the closed loop on corners and random draws of the declared uncertainties: ``specgen robust``.
 
     Args:
-        draws: Random machines, besides the corners.
+        draws: Number of random machines, in addition to the corners.
         vary: Ranges of uncertainties, such as ``{"mass": "5%", "gain": "0.9:1.1"}``.
-        trajectory: What is followed.
-        frequency: Of it, Hz.
+        trajectory: The trajectory.
+        frequency: Its frequency, Hz.
         max_error: Gate, such as ``"30 nm"``; that of the spec if not given.
         max_orientation: Gate for the angles, such as ``"100 nrad"``.
-        quantile: Of the draws that the gate compares, %.
-        diverged_above: Error beyond which a run counts as diverged, such as ``"3 um"``.
-        threads: Of this computer; the result does not depend on it.
+        quantile: Quantile of the draws that the gates check, %.
+        diverged_above: Error above which a run counts as diverged, such as ``"3 um"``.
+        threads: Number of threads; the result does not depend on it.
 
-    A gate that is not passed makes `Result.passed` False. After Ctrl-C, `Interrupted.result` is of the machines so far.
+    If a gate fails, `Result.passed` is False. After Ctrl-C, `Interrupted.result` has the machines so far.
     """
     with tempfile.TemporaryDirectory(prefix="specgen-python-") as folder:
         options = _options(
@@ -332,9 +332,9 @@ def tune(
     seed: int = 1,
     progress: Progress = False,
 ) -> Result:
-    """Tunes gains and weights on the simulated loop: ``specgen tune``; `command` has its rarer options.
+    """Tunes gains and weights on the simulated loop: ``specgen tune``. Use `command` for its other options.
 
-    After Ctrl-C, `Interrupted.result` has the best so far.
+    After Ctrl-C, `Interrupted.result` has the best result so far.
     """
     options = _options(
         what=what,
@@ -353,7 +353,7 @@ def tune(
 
 
 class Identification(Result):
-    """`identify`; `table` is the Everett table: ``up_V``, ``down_V``, ``everett_um``."""
+    """Result of `identify`; `table` is the Everett table: ``up_V``, ``down_V``, ``everett_um``."""
 
     table: Table
 
@@ -372,14 +372,14 @@ def identify(
     """Identifies an Everett table from a record of reversal curves: ``specgen identify``.
 
     Args:
-        drive: Voltages of the table, V.
+        drive: Voltage range of the table, V.
         grid: Cells per axis; chosen by cross-validation if not given.
-        validate: A second record, not used for the fit, to judge the table by.
-        columns: Names of the columns in a file that has its own.
-        rate: Samples per second, where the file has no time, Hz.
-        output: Where the table is written, for specs and `predict`.
+        validate: A second record, not used in the fit, to validate the table.
+        columns: Columns of the file, if they have other names.
+        rate: Sampling rate, if the file has no time, Hz.
+        output: File for the table, for specs and `predict`.
 
-    Other records: ``command("identify", "linear", file)``, and so ``response``, ``gauge``, ``stiffness``, ``gains``.
+    For other records use ``command("identify", "linear", file)``, and likewise ``response``, ``gauge``, ``stiffness``, ``gains``.
     """
     with tempfile.TemporaryDirectory(prefix="specgen-python-") as folder:
         file = Path(output) if output is not None else Path(folder, "table.csv")
@@ -398,7 +398,7 @@ def identify(
 
 
 class Prediction(Result):
-    """`predict`; `samples` has ``time_s``, ``drive_V``, ``displacement_um``, and where it was measured ``measured_um`` and
+    """Result of `predict`; `samples` has ``time_s``, ``drive_V``, ``displacement_um`` and, if measured, ``measured_um`` and
     ``error_um``."""
 
     samples: Table
@@ -415,14 +415,14 @@ def predict(
     rate: float | None = None,
     progress: Progress = False,
 ) -> Prediction:
-    """Predicts what a leg does with a drive: ``specgen identify predict``.
+    """Predicts the displacement of a leg from its drive: ``specgen identify predict``.
 
     Args:
-        model: A table as `identify` writes it, or a spec.
+        model: A table written by `identify`, or a spec.
         drive: A file with ``time_s`` and ``drive_V`` or ``monitor_V``.
-        leg: Of the spec.
-        dead_time: ms.
-        mode: ``"735:0.015"``, Hz and damping ratio, or ``"none"``.
+        leg: Leg of the spec.
+        dead_time: Dead time, ms.
+        mode: Resonance, such as ``"735:0.015"`` (Hz and damping ratio), or ``"none"``.
     """
     with tempfile.TemporaryDirectory(prefix="specgen-python-") as folder:
         file = Path(folder, "prediction.csv")
@@ -438,15 +438,15 @@ def _pairs(columns: Mapping[str, str] | None) -> list[str] | None:
 
 
 class Replayed(Result):
-    """`replay`; `rows` has the words of every tick."""
+    """Result of `replay`; `rows` has the words of every tick."""
 
     rows: Table
 
 
 def replay(recording: StrPath, spec: StrPath | None = None, *, progress: Progress = False) -> Replayed:
-    """Reads a recording; with its spec, runs it again tick by tick and compares it by bits: ``specgen replay``.
+    """Reads a recording; with its spec, replays every tick and compares it bit for bit: ``specgen replay``.
 
-    `Result.passed` is False where a bit differs or a block is damaged. Without a spec no ``cargo`` is needed.
+    `Result.passed` is False if a bit differs or a block is damaged. Without a spec no ``cargo`` is needed.
     """
     with tempfile.TemporaryDirectory(prefix="specgen-python-") as folder:
         file = Path(folder, "rows.csv")
@@ -465,7 +465,7 @@ def record(
     seed: int = 1,
     progress: Progress = False,
 ) -> Result:
-    """Records a simulated run of a wave under the supervisor, for `replay`: ``specgen sim --record``."""
+    """Records a simulated wave under the supervisor, for `replay`: ``specgen sim --record``."""
     options = _options(record=output, seconds=seconds, no_noise=not noise, seed=seed)
     return command("sim", spec, *options, progress=progress)
 
@@ -494,24 +494,24 @@ def learn(
     progress: Progress = False,
 ) -> Result:
     """Learns the correction of a repeated motion, on the simulated machine or, over ``socket`` or ``port``, on a real one, which is armed
-    for it and ramped down after it: ``specgen learn``.
+    first and ramped down afterwards: ``specgen learn``.
 
     Args:
-        trajectory: Of the spec, or ``case-1``, ``case-2``, ``machining``, ``multisine``; ``case-1`` if not given.
-        frequency: Its operating frequency, Hz; 10, or that of the spec.
-        passes: That are learned from; 5.
-        bandwidth: Highest frequency to be learned, Hz; lowered to where every machine within ``[robust]`` converges.
-        vary: Ranges in place of those of ``[robust]``: ``{"stiffness": "2%"}``.
-        prepare: Begin with what the model says lag and modes would leave.
-        start: Begin with this correction, of the same spec, machine and motion.
-        excite: Learn nothing: measure the response of the running loop, and write it here.
-        response: Learn with the response that was measured, not with the model's.
-        on_device: Let the device make each correction, in room for so many knots.
-        output: Where the correction of the best pass goes; `Machine.play` takes it.
-        machine: What the machine at the end of the link is called; a correction is played on no other.
-        plant: Shape of the simulated legs' hysteresis: ``plays``, ``bouc-wen``, or a file of leg parameters.
-        noise: Whether gauges and amplifiers of the simulated machine have any.
-        seed: Of noise and tolerances.
+        trajectory: A trajectory of the spec, or ``case-1``, ``case-2``, ``machining``, ``multisine``; ``case-1`` if not given.
+        frequency: Its operating frequency, Hz; 10, or that of the spec, if not given.
+        passes: Number of learning passes; 5 if not given.
+        bandwidth: Highest frequency to learn, Hz; lowered until every machine within ``[robust]`` converges.
+        vary: Ranges instead of those of ``[robust]``: ``{"stiffness": "2%"}``.
+        prepare: Start from the correction that the model predicts for lag and modes.
+        start: Start from this correction, of the same spec, machine and motion.
+        excite: Learn nothing: measure the response of the running loop, and write it to this file.
+        response: Learn with this measured response instead of the model's.
+        on_device: Let the device compute each correction, with storage for this number of knots.
+        output: File for the correction of the best pass, for `Machine.play`.
+        machine: Name of the machine on the link; a correction is played only on its machine.
+        plant: Hysteresis model of the simulated legs: ``plays``, ``bouc-wen``, or a file of leg parameters.
+        noise: Whether to simulate noise of gauges and amplifiers.
+        seed: Seed of noise and tolerances.
     """
     options = _options(
         trajectory=trajectory,

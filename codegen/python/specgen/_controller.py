@@ -14,7 +14,7 @@ from . import _native
 
 
 def _dtype(words: Iterable[tuple[str, bool]]) -> np.dtype[np.void]:
-    """A field of 8 bytes a word; those that come in sixes are one field."""
+    """A dtype with 8 bytes per word; indexed words form one field."""
     fields: dict[str, tuple[str, int]] = {}
     for name, real in words:
         stem = re.sub(r"\[\d+\]$", "", name)
@@ -24,14 +24,14 @@ def _dtype(words: Iterable[tuple[str, bool]]) -> np.dtype[np.void]:
 
 
 class Controller:
-    """The very controller that the other targets run, on this computer: the same inputs give the same bits.
+    """The controller of the other targets, on this computer: the same inputs give the same bits.
 
-    `controller` makes one of a spec, without building anything; ``Controller(library)`` loads a library that `export_c` or an emitted
-    workspace has. With ``supervised`` a tick is that of the whole machine with its phases; without, the law alone, which nothing
-    watches over.
+    `controller` makes one from a spec, without a build; ``Controller(library)`` loads a library from `export_c` or an emitted
+    workspace. With ``supervised``, a tick is that of the whole machine with its phases; otherwise that of the law alone, without
+    supervision.
 
-    Values are in m, rad, N, V, s. Fields are named as the words are: ``inputs.names``, ``outputs.names``. One controller is run by
-    one thread at a time; others of the same library are independent of it.
+    Values are in m, rad, N, V, s. Fields have the names of the words: ``inputs.names``, ``outputs.names``. A controller can be used by
+    one thread at a time; controllers of the same library are independent.
     """
 
     def __init__(self, library: str | PathLike[str], *, supervised: bool = False) -> None:
@@ -48,9 +48,9 @@ class Controller:
         self.name, self.digest, self.version, self.scalar_bits = self._library.about()
         self.supervised = supervised
         self.inputs = _dtype(self._library.inputs())
-        """What a row of inputs is: ``np.zeros(1000, controller.inputs)``."""
+        """dtype of a row of inputs: ``np.zeros(1000, controller.inputs)``."""
         self.outputs = _dtype(self._library.outputs())
-        """What a row of outputs is."""
+        """dtype of a row of outputs."""
         rows = np.zeros(1, self.inputs), np.zeros(1, self.outputs)
         self._library.bind(_words(rows[0]), _words(rows[1]))
         self.input: np.void = rows[0][0]
@@ -60,7 +60,7 @@ class Controller:
         self._tick = self._library.step
 
     def step(self, **fields: ArrayLike) -> np.void:
-        """One tick: takes the fields that are given into `input`, and returns `output`, which the next tick overwrites."""
+        """One tick: writes the given fields to `input`, and returns `output`, which the next tick overwrites."""
         row: Any = self.input
         for name, values in fields.items():
             row[name] = values
@@ -68,16 +68,16 @@ class Controller:
         return self.output
 
     def run(self, inputs: NDArray[np.void], out: NDArray[np.void] | None = None) -> NDArray[np.void]:
-        """A tick for each row of ``inputs``, an array of `Controller.inputs`; the rows of outputs, in ``out`` if it is given.
+        """One tick for each row of ``inputs``, an array of `Controller.inputs`. Returns the rows of outputs, in ``out`` if given.
 
-        Nothing is copied, and the interpreter is free meanwhile. Ctrl-C ends it between two blocks of 65,536 ticks.
+        It copies nothing and releases the interpreter. Ctrl-C takes effect between blocks of 65,536 ticks.
         """
         if out is None:
             out = np.empty(inputs.shape, self.outputs)
         if inputs.dtype != self.inputs or out.dtype != self.outputs:
-            raise TypeError("arrays of dtype controller.inputs and controller.outputs are expected")
+            raise TypeError("expected arrays of dtype controller.inputs and controller.outputs")
         if not (inputs.flags.c_contiguous and out.flags.c_contiguous):
-            raise ValueError("contiguous arrays are expected")
+            raise ValueError("expected contiguous arrays")
         self._library.run(_words(inputs), _words(out))
         return out
 
@@ -87,19 +87,19 @@ class Controller:
         return dict(self._library.settings())
 
     def configure(self, **settings: float) -> None:
-        """Takes settings, those that are not named as in the spec; names with an index: ``configure(**{"gain[2]": 1.0})``.
+        """Sets settings; others get the values of the spec. For names with an index: ``configure(**{"gain[2]": 1.0})``.
 
-        The state is kept. Raises `Error` for a value out of its range; the settings in force then stay.
+        The state is kept. Raises `Error` if a value is out of its range; the settings are then unchanged.
         """
         self._library.configure(list(settings.items()))
 
     def reset(self) -> None:
-        """The state as at power-up; the settings are kept."""
+        """Resets the state to power-up; the settings are kept."""
         self._library.reset()
 
     @property
     def state_digest(self) -> int:
-        """Digest of all that a tick hands to the next: equal where every later output is."""
+        """Digest of the state. Controllers with equal state have equal outputs for equal inputs."""
         return self._library.state_digest()
 
     def __repr__(self) -> str:

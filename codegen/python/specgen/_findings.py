@@ -1,4 +1,4 @@
-"""What a command gives: findings, a result, or what is raised."""
+"""Findings, results and exceptions of commands."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from ._native import Error as Error
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """What is wrong or strange in a spec or a record, where, and how to mend it."""
+    """A problem of a spec or a record, its location, and a fix."""
 
     code: str
     """Stable code such as ``E0402``; ``specgen.explain(code)`` has its page."""
@@ -25,7 +25,7 @@ class Finding:
     """Counted from 1, in characters."""
     message: str
     help: str
-    """How to mend it."""
+    """The fix."""
 
     def __str__(self) -> str:
         place = ":".join(str(part) for part in (self.file, self.line, self.column) if part is not None)
@@ -33,18 +33,18 @@ class Finding:
 
 
 class Result(Mapping[str, Any]):
-    """What a command found: the fields of its JSON."""
+    """Result of a command: the fields of its JSON."""
 
     def __init__(self, data: dict[str, Any], findings: list[Finding], reason: str | None) -> None:
         self.data = data
         self.findings = findings
-        """About the spec or the record."""
+        """Findings about the spec or the record."""
         self.reason = reason
         """Why it does not pass, if it does not."""
 
     @property
     def passed(self) -> bool:
-        """Whether it is good: what makes the command's exit code 0."""
+        """Whether the command's exit code is 0."""
         return self.reason is None
 
     def __getitem__(self, name: str) -> Any:
@@ -77,16 +77,15 @@ class Refused(Error):
 
 
 class UsageError(Error, ValueError):
-    """Arguments that make no sense, or not together."""
+    """Invalid arguments, or an invalid combination."""
 
 
 class Unavailable(Error):
-    """A tool is missing or fails, or a file cannot be written. ``cargo`` is needed only by what is built: exports, and `controller` with
-    ``emitted``."""
+    """A tool is missing or fails, or a file cannot be written. Only exports and `controller` with ``emitted`` need ``cargo``."""
 
 
 class EndedEarly(Error):
-    """A simulated run did not come to the end of its path, so that it has no figure. ``result`` has the other runs, if there are any."""
+    """A simulated run ended before the end of its path, so it has no score. ``result`` has the other runs, if there are any."""
 
     def __init__(self, message: str, result: Result | None) -> None:
         super().__init__(message)
@@ -94,7 +93,7 @@ class EndedEarly(Error):
 
 
 class Interrupted(KeyboardInterrupt):
-    """Ctrl-C, with what was found until then."""
+    """Ctrl-C, with the result so far."""
 
     def __init__(self, message: str, result: Result) -> None:
         super().__init__(message)

@@ -16,7 +16,7 @@ from ._table import Table, read_table
 
 
 class Machine:
-    """A board at a serial port, or a program that serves the link at a Unix socket: the words of ``specgen operate``.
+    """A board at a serial port, or a program that serves the link at a Unix socket: the commands of ``specgen operate``.
 
     >>> with specgen.Machine(socket="link", spec="platform.toml") as machine:
     ...     machine.arm()
@@ -27,10 +27,10 @@ class Machine:
     ...     machine.move(x=0, y=0, z=5e-6, rx=0, ry=0, rz=0)
     ...     machine.wait("arrived")
 
-    The session stays alive between two orders, in a thread of its own. The machine holds, then ramps down, when it ends
-    (``supervisor.host_lost``); Ctrl-C while an order is under way, and an exception in a ``with`` block, ramp it down first.
+    A separate thread keeps the session alive between commands. When it ends, the machine holds, then ramps down
+    (``supervisor.host_lost``). Ctrl-C during a command, and an exception in a ``with`` block, ramp the machine down first.
 
-    An order that is refused, and a fault while one waits, raise `Error`; the session goes on.
+    A refused command, and a fault during a command, raise `Error`; the session continues.
     """
 
     def __init__(
@@ -42,7 +42,7 @@ class Machine:
         spec: StrPath | None = None,
         progress: Progress = False,
     ) -> None:
-        """With a ``spec`` a machine with another controller is refused."""
+        """With a ``spec``, a machine with another controller is refused."""
         arguments = ["operate"]
         given = {"--socket": socket, "--port": port, "--baud": baud}
         for option, value in given.items():
@@ -54,7 +54,7 @@ class Machine:
         self._answers(None)
 
     def order(self, line: str) -> Any:
-        """Gives an order as ``specgen operate`` takes it, such as ``"wait running 5"``, and returns its answer."""
+        """Executes a command of ``specgen operate``, such as ``"wait running 5"``, and returns its answer."""
         return self._answers(line)
 
     def _answers(self, line: str | None) -> Any:
@@ -63,7 +63,7 @@ class Machine:
         goes_on, text = self._session.answers(line)
         if not goes_on:
             self._session = None
-            # Why it ended: `result_of` raises it.
+            # `result_of` raises the reason.
             return result_of(json.loads(text)).data
         answers = json.loads(text)
         answer = answers[-1]["answer"] if answers else None
@@ -72,24 +72,24 @@ class Machine:
         return answer
 
     def status(self) -> dict[str, Any]:
-        """Tick, phase (``stands``), status, late ticks, health."""
+        """Tick, phase and cause (field ``stands``), status, late ticks, health."""
         status: dict[str, Any] = self.order("status")
         return status
 
     def arm(self) -> None:
-        """Switches the amplifiers on; from then on the machine may `run`."""
+        """Switches the amplifiers on; afterwards the machine can `run`."""
         self.order("arm")
 
     def run(self) -> None:
-        """Goes to the bias pose, or goes on after a hold."""
+        """Moves to the bias pose, or continues after a hold."""
         self.order("run")
 
     def hold(self) -> None:
-        """Keeps the set-point."""
+        """Holds the set-point."""
         self.order("hold")
 
     def ramp_down(self) -> None:
-        """Leads the voltages to rest, and switches the amplifiers off."""
+        """Ramps the voltages down to rest, and switches the amplifiers off."""
         self.order("ramp-down")
 
     def acknowledge(self) -> None:
@@ -97,56 +97,57 @@ class Machine:
         self.order("acknowledge")
 
     def wait(self, until: str | float, limit: float | None = None) -> None:
-        """Until a phase such as ``"running"``, until it has ``"arrived"``, or some seconds; at most ``limit`` seconds."""
+        """Waits for a phase such as ``"running"``, for ``"arrived"``, or for some seconds; at most ``limit`` seconds."""
         self.order(f"wait {until}" if limit is None else f"wait {until} {limit}")
 
     def move(self, **axes: float | str) -> list[float]:
         """Moves to a pose, and returns it, m and rad: ``x``, ``y``, ``z``, ``rx``, ``ry``, ``rz``, as numbers or with a unit,
-        ``z="5um"``. Axes that are not given stay; the first move of a session gives all six."""
+        ``z="5um"``. Other axes keep their values; the first move of a session needs all six."""
         return self._go("move", axes)
 
     def jog(self, **axes: float | str) -> list[float]:
-        """Moves by so much."""
+        """Moves by these steps."""
         return self._go("jog", axes)
 
-    def _go(self, order: str, axes: dict[str, float | str]) -> list[float]:
-        answer = self.order(" ".join([order, *_quantities(axes)]))
+    def _go(self, command: str, axes: dict[str, float | str]) -> list[float]:
+        answer = self.order(" ".join([command, *_quantities(axes)]))
         return [float(part) for part in answer["pose"]]
 
     def can_go(self, *, speed: str | None = None, **axes: float | str) -> str | None:
-        """None if it can go there, or what binds; nothing moves. With a ``speed``, ``"1 mm/s"`` or ``"1 mrad/s"``, at that at least."""
+        """Checks whether a pose can be reached, with a ``speed`` such as ``"1 mm/s"`` or ``"1 mrad/s"`` at least that fast. Returns None,
+        or the limit that is exceeded."""
         words = [] if speed is None else [f"speed={speed.replace(' ', '')}"]
         binds: str | None = self.order(" ".join(["can-i-go", *_quantities(axes), *words]))["binds"]
         return binds
 
     def frame(self, kind: str | None = None, **axes: float | str) -> dict[str, Any]:
-        """Frames in force, um and urad; with ``"work"`` or ``"tool"`` and axes (0 if not given) poses are said in that one from here on,
-        with ``"none"`` in that of the spec."""
+        """Returns the current frame, um and urad. ``"work"`` or ``"tool"`` with axes (0 if not given) sets the frame of poses first;
+        ``"none"`` resets it to that of the spec."""
         words = [] if kind is None else [kind, *_quantities(axes)]
         frame: dict[str, Any] = self.order(" ".join(["frame", *words]))
         return frame
 
     def where(self) -> dict[str, Any]:
-        """Pose by the gauges, set-point and error, um and urad; voltage commanded for each leg, V. What is not measured now is None; ``last`` then has
-        the pose of then and its age, s, and ``why`` the reason."""
+        """Measured pose, set-point and error, um and urad; commanded voltage of each leg, V. Values that are not currently measured are
+        None; ``last`` then has the last measured pose and its age, s, and ``why`` the reason."""
         where: dict[str, Any] = self.order("where")
         return where
 
     def limits(self) -> list[list[float]]:
-        """Least and largest value of each axis from here, the others staying, um and urad."""
+        """Least and largest value of each axis with the others unchanged, um and urad."""
         limits: list[list[float]] = self.order("limits")["limits"]
         return limits
 
     def mark(self, name: str) -> None:
-        """Gives the set-point a name for this session."""
+        """Saves the set-point under a name, for this session."""
         self.order(f"mark {name}")
 
     def goto(self, name: str) -> None:
-        """Goes to a mark, or to ``"zero"``."""
+        """Moves to a mark, or to ``"zero"``."""
         self.order(f"goto {name}")
 
     def play(self, trajectory: str, *, correction: StrPath | None = None, machine: str | None = None) -> dict[str, Any] | None:
-        """Plays a trajectory of the spec; under a ``correction`` that `learn` wrote for it on this ``machine``, with its error, nm and
+        """Plays a trajectory of the spec. With a ``correction`` that `learn` wrote for it on this ``machine``, returns the error, nm and
         nrad rms."""
         words = ["play", trajectory]
         if correction is not None:
@@ -155,27 +156,27 @@ class Machine:
         return played if isinstance(played, dict) else None
 
     def gains(self, **gains: float) -> dict[str, Any]:
-        """Gains in force; sets those that are given first, in SI: ``machine.gains(**{"ki[2]": 1e9})``. Those that
-        the margins of the spec do not bear raise `Error`."""
+        """Returns the current gains, after setting the given ones, in SI: ``machine.gains(**{"ki[2]": 1e9})``. Gains without
+        sufficient stability margins raise `Error`."""
         words = [f"{name}={float(value)!r}" for name, value in gains.items()]
         found: dict[str, Any] = self.order(" ".join(["gains", *words]))
         return found
 
     def output_line(self, line: int, **settings: float | str) -> None:
-        """Lets an output line (``[[trigger]]``) show something else: ``machine.output_line(0, kind="position", step=1e-6)``, in SI."""
+        """Changes settings of an output line (``[[trigger]]``), in SI: ``machine.output_line(0, kind="position", step=1e-6)``."""
         words = [f"{name}={value if isinstance(value, str) else repr(value)}" for name, value in settings.items()]
         self.order(" ".join(["trigger", str(line), *words]))
 
     def watch(self, seconds: float, *, every: int = 1000) -> Table:
-        """Samples of the running machine for so long: least, mean and largest value over ``every`` ticks. Gaps are rows that are not
-        there."""
+        """Samples of the running machine for some seconds: least, mean and largest value over ``every`` ticks. Rows are missing in
+        gaps."""
         with tempfile.TemporaryDirectory(prefix="specgen-python-") as folder:
             file = Path(folder, "samples.csv")
             self.order(f"watch {every} {float(seconds)!r} {file}")
             return read_table(file)
 
     def mode(self, mode: str) -> None:
-        """Terms of the law, such as ``"pf-pcc"``."""
+        """Sets the control mode, such as ``"pf-pcc"``."""
         self.order(f"mode {mode}")
 
     def set(self, **words: float) -> None:
@@ -183,16 +184,16 @@ class Machine:
         self.order("set " + " ".join(f"{name}={value!r}" for name, value in words.items()))
 
     def settings(self) -> dict[str, float]:
-        """Settings in force."""
+        """The current settings."""
         settings: dict[str, float] = self.order("config")
         return settings
 
     def write_settings(self, spec: StrPath) -> None:
-        """Takes the settings of a spec; its tables stay in the spec."""
+        """Writes the settings of a spec to the machine, without its tables."""
         self.order(f"config write {fspath(spec)}")
 
     def wave(self, file: StrPath | None) -> None:
-        """Starts the wave of a file; None ends the one under way."""
+        """Starts the wave in a file; None ends the running one."""
         self.order("wave stop" if file is None else f"wave {fspath(file)}")
 
     def record(self, after: int | None = None) -> dict[str, Any]:
@@ -205,12 +206,12 @@ class Machine:
         return self.recorder("trigger")
 
     def recorder(self, action: str = "look") -> dict[str, Any]:
-        """How the recorder stands; ``"stop"`` stops it first, ``"trigger"`` triggers it."""
+        """State of the recorder; ``"stop"`` stops it first, ``"trigger"`` triggers it."""
         recorder: dict[str, Any] = self.order(f"record {action}")
         return recorder
 
     def stop(self) -> None:
-        """Ramps down and ends the program that serves the link; a board only ramps down, and raises `Error`."""
+        """Ramps down and ends the program that serves the link; for a board it raises `Error`."""
         self.order("stop")
 
     def download(self, file: StrPath) -> None:
@@ -218,7 +219,7 @@ class Machine:
         self.order(f"record download {fspath(file)}")
 
     def close(self, *, ramp_down: bool = False) -> Result | None:
-        """Ends the session; with ``ramp_down`` only when the amplifiers are off. How the machine stood, or None if it had ended."""
+        """Ends the session, with ``ramp_down`` after ramping down. Returns the final state, or None if the session had ended."""
         session, self._session = self._session, None
         document = session.close(ramp_down) if session is not None else None
         if document is None:
@@ -238,7 +239,7 @@ class Machine:
 
 
 def _quantities(axes: dict[str, float | str]) -> list[str]:
-    """Words of an order: numbers get the unit of their axis."""
+    """Words of a command; numbers get the unit of their axis."""
 
     def value(axis: str, given: float | str) -> str:
         if isinstance(given, str):

@@ -1,4 +1,4 @@
-"""What is not Python in this package; `specgen` gives it names, types and documentation."""
+"""The native part of this package; `specgen` provides its names, types and documentation."""
 
 from collections.abc import Callable, Sequence
 from os import PathLike

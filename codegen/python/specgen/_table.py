@@ -1,4 +1,4 @@
-"""CSV that the commands write, as arrays."""
+"""Reads CSV files of commands as arrays."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-# `setpoint_rate[3]_rad/s`: a name, the place among six, the unit.
+# `setpoint_rate[3]_rad/s`: a name, the index, the unit.
 _INDEXED = re.compile(r"(.+)\[(\d+)\](?:_(.+))?")
 
 
 class Table(Mapping[str, NDArray[Any]]):
-    """Columns by name. Those that come in sixes, ``voltage[0]`` to ``voltage[5]``, are one array with a row a sample; other names are
-    as in the file, unit included: ``time_s``."""
+    """Columns by name. Indexed columns, ``voltage[0]`` to ``voltage[5]``, are one array with a row per sample; other names are those of
+    the file, including the unit: ``time_s``."""
 
     def __init__(self, columns: dict[str, NDArray[Any]], units: dict[str, tuple[str | None, ...]]) -> None:
         self._columns = columns
         self.units = units
-        """Units of the columns that come in sixes, where the file names them."""
+        """Units of indexed columns, if the file has them."""
 
     def __getitem__(self, name: str) -> NDArray[Any]:
         return self._columns[name]
@@ -38,8 +38,8 @@ class Table(Mapping[str, NDArray[Any]]):
         return f"Table({', '.join(f'{name}{list(column.shape)}' for name, column in self.items())})"
 
     def to_pandas(self) -> Any:
-        """A ``pandas.DataFrame``, with a column each: ``voltage[0]``."""
-        # Which need not be there, nor its types.
+        """A ``pandas.DataFrame``, with one column per index: ``voltage[0]``."""
+        # pandas and its types are optional.
         pandas = import_module("pandas")
         flat: dict[str, NDArray[Any]] = {}
         for name, column in self.items():
@@ -51,10 +51,10 @@ class Table(Mapping[str, NDArray[Any]]):
 
 
 def read_table(path: str | PathLike[str]) -> Table:
-    """Reads a CSV file with one line of names; columns with anything but numbers are text."""
-    # A pipe without a writer, or a device, would be waited for.
+    """Reads a CSV file with one header line; columns that are not numeric are text."""
+    # Opening a pipe without a writer, or a device, would block.
     if Path(path).exists() and not Path(path).is_file():
-        raise OSError(f"{path}: it is no regular file")
+        raise OSError(f"{path}: not a regular file")
     with open(path, encoding="utf-8") as file:
         names = file.readline().rstrip("\n").split(",")
         first = file.readline().rstrip("\n").split(",")
@@ -67,7 +67,7 @@ def read_table(path: str | PathLike[str]) -> Table:
                     columns[place] = column
             break
         except ValueError:
-            # One of them has something else further down.
+            # One of them has text further down.
             numbers = [place for place in numbers if _all_numbers(path, place)]
     table: dict[str, NDArray[Any]] = {}
     units: dict[str, tuple[str | None, ...]] = {}

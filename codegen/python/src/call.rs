@@ -1,4 +1,4 @@
-//! A command as a function: it runs in a thread of its own, without the interpreter, while the calling one looks after signals.
+//! A command as a function: it runs in a separate thread, without the interpreter, while the calling thread handles signals.
 
 use std::ffi::OsString;
 use std::sync::Mutex;
@@ -14,53 +14,53 @@ use specgen::ui::Message;
 
 use crate::Error;
 
-/// How often signals are looked after.
-const GLANCE: Duration = Duration::from_millis(50);
-/// How long an interrupted command may take to come to a result. One that takes longer goes on to the end of what it is at, unheard.
+/// Interval of checks for signals.
+const POLL: Duration = Duration::from_millis(50);
+/// How long to wait for the result of an interrupted command. After that its result is discarded.
 const PATIENCE: Duration = Duration::from_secs(10);
-/// The same for a machine that is ramped down.
+/// How long to wait for a machine to ramp down.
 const DOWN: Duration = Duration::from_secs(90);
 
-/// What a running command says.
-enum Word {
+/// Output of a running command.
+enum Output {
     Progress(String),
     Answers(String),
     Document(String),
 }
 
 /// A command in its thread.
-struct Running {
-    /// Behind a lock that nobody else takes: a receiver by itself is not shared between threads.
-    words: Mutex<Receiver<Word>>,
-    /// A byte a command, which a thread may look at when nobody waits for it any more.
+struct CommandThread {
+    /// In a mutex only because a receiver is not `Sync`.
+    words: Mutex<Receiver<Output>>,
+    /// Leaked, one byte per command, because the thread may outlive this value.
     stop: &'static AtomicBool,
     patience: Duration,
     progress: Option<Py<PyAny>>,
-    /// What is raised when it has ended.
+    /// The error to raise when it has ended, and when it occurred.
     raised: Option<(PyErr, Instant)>,
 }
 
-impl Running {
+impl CommandThread {
     fn start(
         arguments: Vec<OsString>,
-        orders: Option<Receiver<String>>,
+        commands: Option<Receiver<String>>,
         patience: Duration,
         progress: Option<Py<PyAny>>,
     ) -> PyResult<Self> {
         let stop: &'static AtomicBool = Box::leak(Box::new(AtomicBool::new(false)));
         let (tell, words) = mpsc::channel();
         thread::Builder::new().name("specgen".to_owned()).spawn(move || {
-            let told = tell.clone();
+            let sender = tell.clone();
             let hear = move |message: Message<'_>| {
                 let word = match message {
-                    Message::Progress(line) => Word::Progress(line.to_owned()),
-                    Message::Answers(answers) => Word::Answers(answers.to_string()),
+                    Message::Progress(line) => Output::Progress(line.to_owned()),
+                    Message::Answers(answers) => Output::Answers(answers.to_string()),
                 };
-                // Where nobody listens any more, it was told to stop.
-                let _ = told.send(word);
+                // Without a receiver the command was already stopped.
+                let _ = sender.send(word);
             };
-            let document = perform(arguments, stop, hear, orders).to_string();
-            let _ = tell.send(Word::Document(document));
+            let document = perform(arguments, stop, hear, commands).to_string();
+            let _ = tell.send(Output::Document(document));
         })?;
         Ok(Self { words: Mutex::new(words), stop, patience, progress, raised: None })
     }
@@ -70,17 +70,17 @@ impl Running {
         self.raised = Some((error, Instant::now()));
     }
 
-    /// The next word that is no progress. What was raised meanwhile ends the command, and is raised unless it is an interrupt, after
-    /// which there may be a part of a result.
-    fn next(&mut self, py: Python<'_>) -> PyResult<Word> {
+    /// The next output other than progress. An error meanwhile ends the command, and is raised unless it is an interrupt, after which
+    /// there may be a partial result.
+    fn next(&mut self, py: Python<'_>) -> PyResult<Output> {
         loop {
             let words = &self.words;
             let word = py.detach(|| match words.lock() {
-                Ok(words) => words.recv_timeout(GLANCE),
+                Ok(words) => words.recv_timeout(POLL),
                 Err(_) => Err(RecvTimeoutError::Disconnected),
             });
             match word {
-                Ok(Word::Progress(line)) => {
+                Ok(Output::Progress(line)) => {
                     if self.raised.is_none()
                         && let Some(progress) = &self.progress
                         && let Err(error) = progress.call1(py, (line,))
@@ -95,13 +95,13 @@ impl Running {
                 }
                 Err(RecvTimeoutError::Timeout) => {}
                 Err(RecvTimeoutError::Disconnected) => {
-                    let message = "specgen has a defect here: it panicked; standard error says where";
+                    let message = "bug in specgen: it panicked; see standard error for the location";
                     return Err(PyRuntimeError::new_err(message));
                 }
             }
             match (py.check_signals(), &self.raised) {
                 (Err(error), None) => self.stop(error),
-                // Pressed once more, or for long enough.
+                // A second interrupt.
                 (Err(error), Some(_)) => return Err(error),
                 (Ok(()), Some((_, since))) if since.elapsed() > self.patience => {
                     let error = self.raised.take().map(|(error, _)| error);
@@ -114,7 +114,7 @@ impl Running {
 
     fn document(&mut self, py: Python<'_>) -> PyResult<String> {
         loop {
-            if let Word::Document(text) = self.next(py)? {
+            if let Output::Document(text) = self.next(py)? {
                 return Ok(text);
             }
         }
@@ -123,20 +123,20 @@ impl Running {
 
 /// Runs `specgen ARGUMENTS` and returns the JSON document that the command prints with `--json`.
 ///
-/// `progress` is called with each line of progress. The interpreter is free meanwhile. After Ctrl-C, a command that has a result on
-/// the way returns it with exit code 130; another returns none with it.
+/// `progress` is called with each line of progress. The interpreter is released. After Ctrl-C, a command with a partial result returns
+/// it with exit code 130; others return that code without a result.
 #[pyfunction]
 #[pyo3(signature = (arguments, progress=None))]
 pub fn call(py: Python<'_>, arguments: Vec<OsString>, progress: Option<Py<PyAny>>) -> PyResult<String> {
-    Running::start(arguments, None, PATIENCE, progress)?.document(py)
+    CommandThread::start(arguments, None, PATIENCE, progress)?.document(py)
 }
 
-/// A command that takes orders line by line, and keeps its link alive in between.
+/// A command that reads lines, and keeps its link alive between them.
 #[pyclass(module = "specgen._native")]
 pub struct Session {
-    /// None: it has ended.
-    orders: Option<Sender<String>>,
-    running: Running,
+    /// None once it has ended.
+    commands: Option<Sender<String>>,
+    running: CommandThread,
 }
 
 #[pymethods]
@@ -145,39 +145,39 @@ impl Session {
     #[new]
     #[pyo3(signature = (arguments, progress=None))]
     fn new(arguments: Vec<OsString>, progress: Option<Py<PyAny>>) -> PyResult<Self> {
-        let (orders, lines) = mpsc::channel();
-        let running = Running::start(arguments, Some(lines), DOWN, progress)?;
-        Ok(Self { orders: Some(orders), running })
+        let (commands, lines) = mpsc::channel();
+        let running = CommandThread::start(arguments, Some(lines), DOWN, progress)?;
+        Ok(Self { commands: Some(commands), running })
     }
 
-    /// Gives a line and waits for its answers, without one for those that come first: whether the command goes on, and JSON: the
-    /// answers, or the document of a command that has ended.
+    /// Sends a line and waits for its answers; without a line, waits for the initial ones. Returns whether the command continues, and
+    /// JSON: the answers, or the document of a command that has ended.
     #[pyo3(signature = (line=None))]
     fn answers(&mut self, py: Python<'_>, line: Option<String>) -> PyResult<(bool, String)> {
-        let Some(orders) = &self.orders else { return Err(Error::new_err("the session has ended")) };
+        let Some(commands) = &self.commands else { return Err(Error::new_err("the session has ended")) };
         if let Some(line) = line {
-            // One that has ended says so below.
-            let _ = orders.send(line);
+            // If the command has ended, the document below shows it.
+            let _ = commands.send(line);
         }
         match self.running.next(py)? {
-            Word::Answers(answers) => Ok((true, answers)),
-            Word::Document(document) => {
-                self.orders = None;
+            Output::Answers(answers) => Ok((true, answers)),
+            Output::Document(document) => {
+                self.commands = None;
                 Ok((false, document))
             }
-            // `next` passed it on.
-            Word::Progress(_) => Err(PyRuntimeError::new_err("progress is no answer")),
+            // `next` never returns it.
+            Output::Progress(_) => Err(PyRuntimeError::new_err("progress is not an answer")),
         }
     }
 
-    /// Ends the session and returns its document; with `down` as Ctrl-C ends it, which ramps a machine down.
+    /// Ends the session and returns its document; with `down`, like Ctrl-C, it ramps the machine down first.
     fn close(&mut self, py: Python<'_>, down: bool) -> PyResult<Option<String>> {
-        let Some(orders) = self.orders.take() else { return Ok(None) };
+        let Some(commands) = self.commands.take() else { return Ok(None) };
         if down {
             self.running.stop.store(true, Ordering::SeqCst);
         }
-        // After that: where lines end, the command looks at it.
-        drop(orders);
+        // Only now: at the end of its lines, the command checks `stop`.
+        drop(commands);
         self.running.document(py).map(Some)
     }
 }

@@ -1,4 +1,4 @@
-//! A controller, emitted or of a compiled spec, on rows of words that Python holds.
+//! A controller, emitted or from a compiled spec, on rows of words in Python's memory.
 #![allow(unsafe_code)]
 
 use std::path::PathBuf;
@@ -12,7 +12,7 @@ use specgen::{compile, files, run_time};
 
 use crate::Error;
 
-/// Ticks between two looks at signals.
+/// Ticks between checks for signals.
 const BLOCK: usize = 1 << 16;
 
 /// The law alone, or with its supervisor.
@@ -39,18 +39,18 @@ impl Tick {
     }
 }
 
-/// Places of the reals among words, and a row of them, where the controller has another scalar than Python.
-struct Rounded {
+/// Indices of reals, and buffers for rows, if the controller's scalar is not that of Python.
+struct Conversion {
     reals: [Vec<usize>; 2],
     rows: [Vec<u64>; 2],
 }
 
-/// A controller with one configuration and one state: a host library, or the law on the constants of a compiled spec. A row is a word of 64 bits for each name: reals as f64, which
-/// are rounded to the controller's scalar, and whole numbers.
+/// A controller with one configuration and one state: a host library, or the law with the constants of a compiled spec. A row has a
+/// 64-bit word for each name: integers, and reals as f64, which are rounded to the controller's scalar.
 #[pyclass(module = "specgen._native")]
 pub struct Library {
     tick: Tick,
-    rounded: Option<Rounded>,
+    rounded: Option<Conversion>,
     inputs: Vec<String>,
     outputs: Vec<String>,
     /// Rows of [`Library::step`].
@@ -74,12 +74,12 @@ impl Library {
     /// Loads a host library; with its supervisor if `supervised`.
     #[new]
     fn new(path: PathBuf, supervised: bool) -> PyResult<Self> {
-        // A pipe in its place would be waited for.
+        // Refuses a pipe, on which loading would block.
         drop(files::open_file(&path).map_err(|unread| refused(format!("{}: {unread}", path.display())))?);
         Self::of(Controller::load(&path).map_err(refused)?, supervised)
     }
 
-    /// Compiles a spec, and runs the law on its constants: nothing is built. With its supervisor if `supervised`.
+    /// Compiles a spec, and runs the law with its constants, without a build. With its supervisor if `supervised`.
     #[staticmethod]
     fn of_spec(py: Python<'_>, spec: PathBuf, supervised: bool) -> PyResult<Self> {
         let controller = py.detach(|| {
@@ -116,7 +116,7 @@ impl Library {
         about.config_names.iter().zip(controller.default_config()).map(value).collect()
     }
 
-    /// Takes settings, those that are not named as in the spec; the state is kept.
+    /// Sets settings; others get the values of the spec. The state is kept.
     fn configure(&mut self, settings: Vec<(String, f64)>) -> PyResult<()> {
         let controller = self.tick.controller();
         let mut words = controller.default_config();
@@ -130,7 +130,7 @@ impl Library {
         .map_err(refused)
     }
 
-    /// State as at power-up.
+    /// Resets the state to power-up.
     fn reset(&mut self) {
         match &mut self.tick {
             Tick::Law(law) => law.reset(),
@@ -146,7 +146,7 @@ impl Library {
         }
     }
 
-    /// The rows that [`Library::step`] reads and writes.
+    /// Sets the rows that [`Library::step`] reads and writes.
     fn bind(&mut self, input: PyBuffer<u64>, output: PyBuffer<u64>) -> PyResult<()> {
         rows(&input, self.inputs.len(), false)?;
         rows(&output, self.outputs.len(), true)?;
@@ -158,18 +158,18 @@ impl Library {
     fn step(&mut self) -> PyResult<()> {
         let Some([input, output]) = &self.bound else { return Err(PyValueError::new_err("no rows are bound")) };
         let (input, output) = (input.buf_ptr().cast::<u64>(), output.buf_ptr().cast::<u64>());
-        // SAFETY: `bind` checked length, alignment and that the second may be written; the buffers are held, and the interpreter,
-        // without which nobody else writes to them.
+        // SAFETY: `bind` checked length, alignment and that the second is writable. We hold the buffers, and the interpreter, without
+        // which nobody else writes to them.
         unsafe { self.tick(input, output) };
         Ok(())
     }
 
-    /// A tick a row, from `inputs` to `outputs`; the interpreter is free meanwhile, and nobody may write to either. They do not
-    /// overlap. After Ctrl-C the rows so far are written.
+    /// One tick per row, from `inputs` to `outputs`, which must not overlap. The interpreter is released; nobody may write to either
+    /// meanwhile. After Ctrl-C the rows so far are written.
     fn run(&mut self, py: Python<'_>, inputs: PyBuffer<u64>, outputs: PyBuffer<u64>) -> PyResult<()> {
         let count = rows(&inputs, self.inputs.len(), false)?;
         if rows(&outputs, self.outputs.len(), true)? != count {
-            return Err(PyValueError::new_err("as many rows of outputs as of inputs are expected"));
+            return Err(PyValueError::new_err("expected as many rows of outputs as of inputs"));
         }
         let (from, to) = (inputs.buf_ptr() as usize, outputs.buf_ptr() as usize);
         if from < to + outputs.len_bytes() && to < from + inputs.len_bytes() {
@@ -179,9 +179,9 @@ impl Library {
             let end = count.min(block + BLOCK);
             py.detach(|| {
                 for row in block..end {
-                    // SAFETY: `rows` checked that there are `count` rows, aligned, and that the outputs may be written; both
-                    // buffers are held until the end. That nobody writes to them meanwhile is the caller's duty, as for every
-                    // function of numpy that frees the interpreter.
+                    // SAFETY: `rows` checked that there are `count` aligned rows, and that the outputs are writable; we hold both
+                    // buffers until the end. The caller must ensure that nobody writes to them meanwhile, as for every function of
+                    // numpy that releases the interpreter.
                     unsafe {
                         let input = (from as *const u64).add(row * self.inputs.len());
                         self.tick(input, (to as *mut u64).add(row * self.outputs.len()));
@@ -205,7 +205,7 @@ impl Library {
             Tick::Law(law) => (law.description().input_names.clone(), law.description().output_names.clone()),
             Tick::Supervised(supervised) => (supervised.input_names(), supervised.output_names()),
         };
-        let rounded = (tick.controller().description().scalar != Scalar::F64).then(|| Rounded {
+        let rounded = (tick.controller().description().scalar != Scalar::F64).then(|| Conversion {
             reals: [reals(&inputs), reals(&outputs)],
             rows: [vec![0; inputs.len()], vec![0; outputs.len()]],
         });
@@ -213,16 +213,16 @@ impl Library {
     }
 
     /// # Safety
-    /// The pointers are to a row of inputs and one of outputs, which do not overlap.
+    /// The pointers must be to a row of inputs and a row of outputs, which do not overlap.
     unsafe fn tick(&mut self, input: *const u64, output: *mut u64) {
-        // SAFETY: the caller's duty.
+        // SAFETY: guaranteed by the caller.
         let (input, output) = unsafe {
             (
                 std::slice::from_raw_parts(input, self.inputs.len()),
                 std::slice::from_raw_parts_mut(output, self.outputs.len()),
             )
         };
-        let Some(Rounded { reals, rows: [row_in, row_out] }) = &mut self.rounded else {
+        let Some(Conversion { reals, rows: [row_in, row_out] }) = &mut self.rounded else {
             return self.tick.step(input, output);
         };
         row_in.copy_from_slice(input);
@@ -243,7 +243,7 @@ fn rows(buffer: &PyBuffer<u64>, words: usize, written: bool) -> PyResult<usize> 
     let aligned = (buffer.buf_ptr() as usize).is_multiple_of(align_of::<u64>());
     if !fits || !aligned || (written && buffer.readonly()) {
         return Err(PyValueError::new_err(format!(
-            "rows of {words} words are expected, contiguous and aligned, and outputs that can be written"
+            "expected contiguous and aligned rows of {words} words, and writable outputs"
         )));
     }
     Ok(buffer.item_count() / words)

@@ -1,5 +1,5 @@
-//! The part of the Python package `specgen` that is not Python: commands as functions, and a controller on memory that Python
-//! holds. `specgen/*.py` gives both their names, types and documentation.
+//! The native part of the Python package `specgen`: commands as functions, and a controller on Python's memory. `specgen/*.py`
+//! provides their names, types and documentation.
 
 mod call;
 mod controller;
@@ -7,7 +7,7 @@ mod controller;
 use pyo3::exceptions::PyException;
 use pyo3::{create_exception, pymodule};
 
-create_exception!(specgen, Error, PyException, "What specgen refuses or cannot do.");
+create_exception!(specgen, Error, PyException, "An error of specgen.");
 
 /// `specgen._native`.
 #[pymodule]

@@ -36,7 +36,7 @@ def test_what_is_no_plain_file_is_not_waited_for(tmp_path: Path) -> None:
     pipe = tmp_path / "pipe"
     os.mkfifo(pipe)
     for path in [pipe, Path("/dev/zero")]:
-        with pytest.raises(OSError, match="no regular file"):
+        with pytest.raises(OSError, match="not a regular file"):
             specgen.read_table(path)
         with pytest.raises(specgen.Error, match="expected a regular file"):
             specgen.Controller(path)

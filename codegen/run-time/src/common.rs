@@ -1,4 +1,4 @@
-//! Constants that both laws ask for, and how a law gets at its constants.
+//! Constants of both laws, and how a law accesses its constants.
 
 use std::fmt::Debug;
 
@@ -15,7 +15,7 @@ use crate::InvalidIr;
 use crate::convert::Convert;
 use crate::memory::{Memory, Table, models};
 
-/// A scalar that a controller can be run in.
+/// A scalar type of a controller.
 pub trait Number: Real + Debug + Send + Sync + 'static {}
 impl<T: Real + Debug + Send + Sync + 'static> Number for T {}
 
@@ -24,11 +24,11 @@ pub trait Constants: Debug + Send + Sync + Sized + 'static {
     type Real: Number;
     type Law: ControlLaw<AtRunTime<Self>>;
     fn common(&self) -> &Common<Self::Real>;
-    /// Switches on what the spec asks for, of parts that it may leave out.
+    /// Switches on the optional parts of the spec.
     fn complete(&self, state: &mut StateOf<AtRunTime<Self>>);
 }
 
-/// Them, for the law.
+/// A reference to the constants, for the law.
 #[derive(Debug)]
 pub struct AtRunTime<C: 'static>(pub &'static C);
 
@@ -59,8 +59,8 @@ macro_rules! accessors {
     };
 }
 
-/// The constants of a law beside those that both ask for: of each its name, its type, and what it is made of. The law is given a value
-/// (`copy`), a reference (`lend`), a reference if there is one (`maybe`), or nothing (`own`).
+/// The additional constants of a law, each with name, type and value. The law gets a value (`copy`), a reference (`lend`), an optional
+/// reference (`maybe`), or nothing (`own`).
 macro_rules! law_constants {
     (@accessor own $field:ident: $kind:ty) => {};
     (@accessor copy $field:ident: $kind:ty) => {
@@ -134,7 +134,7 @@ impl<C: Constants> Spec for AtRunTime<C> {
     }
 }
 
-/// The constants, what legs are at reset, and what the controller says of itself.
+/// The constants, the state of legs at reset, and the controller's description.
 #[derive(Debug)]
 pub struct Common<T: Real> {
     pub tables: [Table<T>; LEGS],
@@ -154,7 +154,7 @@ pub struct Common<T: Real> {
     pub code: i32,
     /// The spec's settings.
     pub settings: Vec<u64>,
-    /// See [`host_sim::controller::Engine::text`], but for the words of a machine.
+    /// See [`host_sim::controller::Engine::text`]; without the words of a machine.
     pub text: String,
 }
 

@@ -1,4 +1,4 @@
-//! Numbers of the IR in the scalar of the controller.
+//! Converts numbers of the IR to the scalar of the controller.
 
 use std::cell::Cell;
 use std::marker::PhantomData;
@@ -8,10 +8,9 @@ use specgen_runtime::Real;
 
 use crate::InvalidIr;
 
-/// Converts numbers and notes whether all of them were finite.
+/// Converts numbers, and checks that all of them are finite.
 ///
-/// The emitted text has the shortest decimal of the number rounded to the scalar, which reads back as the same bits: rounding is all
-/// that is to be done here.
+/// The emitted text has the shortest decimal of the rounded number, which parses to the same bits, so only rounding is needed here.
 pub struct Convert<T> {
     finite: Cell<bool>,
     scalar: PhantomData<T>,

@@ -1,4 +1,4 @@
-//! A law over its constants, as [`host_sim::controller::Engine`].
+//! A law with its constants, as a [`host_sim::controller::Engine`].
 
 use std::alloc::Layout;
 use std::any::Any;
@@ -22,7 +22,7 @@ struct RunTime<C: Constants> {
     machine: Box<Machine<AtRunTime<C>>>,
 }
 
-/// The controller of these constants, which stay in memory, in the spec's configuration.
+/// The controller with these constants, which stay in memory, in the spec's configuration.
 pub fn boxed<C: Constants>(constants: C) -> Result<Box<dyn Engine>, ControllerError>
 where
     SettingsOf<AtRunTime<C>>: Send + Sync,
@@ -138,7 +138,7 @@ where
     }
 
     fn load_machine(&mut self, words: &[u64]) -> Result<(), usize> {
-        // Into a machine at reset, which is given up where a word is refused.
+        // Into a new machine, which is discarded if a word is refused.
         let mut machine = self.machine_at_reset();
         let restored = machine.restore(&mut Reader::new(words).within(self.constants.sizes()));
         restored.map_err(|invalid| invalid.word)?;

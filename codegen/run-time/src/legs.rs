@@ -1,4 +1,4 @@
-//! Six legs with their own gauges whose constants are read at run time.
+//! Six legs with their own gauges, with constants at run time.
 
 use specgen_ir::scalar::Numbers as _;
 use specgen_ir::{self as ir, Ir};
@@ -10,7 +10,7 @@ use crate::common::{AtRunTime, Common, Constants, Number, law_constants};
 use crate::convert::Convert;
 use crate::parts::Optional;
 
-/// A way this short, m and rad, is none; as the emitted `APPROACH_NEGLIGIBLE`.
+/// Negligible distance of an approach, m and rad; as the emitted `APPROACH_NEGLIGIBLE`.
 const APPROACH_NEGLIGIBLE: f64 = 1e-13;
 
 law_constants! {

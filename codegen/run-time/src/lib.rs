@@ -1,13 +1,14 @@
-//! A compiled spec as a controller, without building it: the law of `specgen-law` over constants that come from the IR.
+//! Runs a compiled spec as a controller without a build: the law of `specgen-law` with constants from the IR.
 //!
 //! ```text
 //! IR ──► constants (numbers rounded as in the emitted text, sizes checked) ──► law ──► host_sim::Controller
 //! ```
 //! Every output, code, digest and snapshot has the bits of the emitted controller. A tick takes longer, and sizes are data: tables are
-//! slices, a reversal memory has room for the largest that a spec may ask for and stores as many extrema as this spec does, and
-//! parts that a spec may leave out are there and switched off.
+//! slices, a reversal memory has the largest permitted size but stores only as many extrema as the spec's, and optional parts can be
+//! switched off.
 //!
-//! Both laws are compiled here in both scalars, and used through [`host_sim::controller::Engine`]: who simulates compiles none of it.
+//! Both laws are compiled here in both scalars, and used through [`host_sim::controller::Engine`], so that simulations need not compile
+//! them.
 
 mod common;
 mod convert;
@@ -31,10 +32,10 @@ use convert::Convert;
 
 /// The controller of a compiled spec, with the spec's configuration and the power-up state.
 ///
-/// Its constants, with the tables and paths of this spec, stay in memory to the end of the process. [`Controller::fork`] adds none.
+/// Its constants, with tables and paths, stay in memory to the end of the process. [`Controller::fork`] shares them.
 ///
 /// # Errors
-/// The IR is none that the compiler makes.
+/// The IR is not one from the compiler.
 pub fn controller(ir: &Ir) -> Result<Controller, InvalidIr> {
     let engine = match ir.scalar {
         Scalar::F32 => engine::<f32>(ir)?,
@@ -61,7 +62,7 @@ pub struct Dynamics {
     pub coriolis: [f64; 6],
     /// G(h): N, N m.
     pub gravity: [f64; 6],
-    /// N, > 0 pushes the platform.
+    /// N; positive forces push the platform.
     pub leg_forces: [f64; 6],
     /// Δl from rest, m.
     pub displacements: [f64; 6],
@@ -93,12 +94,12 @@ fn dynamics_in<T: common::Number + Into<f64>>(ir: &Ir, motion: &Motion<f64>) -> 
     }
 }
 
-/// Why an IR is not run: it is none that the compiler makes.
+/// An IR that is not one from the compiler.
 #[derive(Debug)]
 pub enum InvalidIr {
     /// A part of it is out of range.
     Part(&'static str),
-    /// It describes or configures itself badly.
+    /// Its description or configuration is invalid.
     Controller(ControllerError),
 }
 

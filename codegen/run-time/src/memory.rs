@@ -1,4 +1,4 @@
-//! Hysteresis models whose kind, table size and memory a spec decides.
+//! Hysteresis models with kind, table size and memory chosen by the spec.
 
 use std::convert::Infallible;
 use std::fmt::Debug;
@@ -14,10 +14,10 @@ use specgen_runtime::{
 use crate::InvalidIr;
 use crate::convert::Convert;
 
-/// Most extrema that `hysteresis.memory` may ask for.
+/// Largest `hysteresis.memory`, extrema.
 pub const ROOM: usize = 256;
 
-/// A static model, one that knows the rate, or one with so many creep operators.
+/// A static model, a rate-dependent one, or one with a number of creep operators.
 macro_rules! models {
     ($($creep:ident $count:literal),+) => {
         /// Table of a leg.
@@ -28,7 +28,7 @@ macro_rules! models {
             $($creep(CreepEverett<'static, T, Nodes<'static, T>, $count>),)+
         }
 
-        /// What a leg remembers of its drive.
+        /// Memory of a leg's drive.
         #[derive(Debug, Clone, Copy)]
         pub enum Memory<T: Real> {
             Static(ReversalMemory<T, ROOM>),
@@ -37,7 +37,7 @@ macro_rules! models {
         }
 
         impl<T: Real> Field for Memory<T> {
-            /// Of the largest; how many there are depends on the sizes, see [`Snapshot::word_count`].
+            /// Words of the largest kind; the actual number depends on the sizes, see [`Snapshot::word_count`].
             const WORDS: usize = DynamicMemory::<T, ROOM>::WORDS;
         }
 
@@ -89,7 +89,7 @@ macro_rules! models {
 }
 models!(Creep1 1, Creep2 2, Creep3 3, Creep4 4, Creep5 5, Creep6 6);
 
-/// An array of a slice of exactly its length.
+/// Converts a slice of exactly its length to an array.
 trait FromSlice: Sized {
     fn from_slice(values: &[f64]) -> Option<&Self>;
 }
@@ -160,7 +160,7 @@ impl<T: Real + Debug> LegMemory<T, Table<T>> for Memory<T> {
     ) -> bool {
         match (self, table) {
             (Self::Static(memory), Table::Static(table)) => memory.track(table, last, displacement, permitted),
-            // No other has a short way.
+            // Only the static model has this fast path.
             _ => false,
         }
     }
@@ -188,7 +188,7 @@ pub fn models<T: Real>(convert: &Convert<T>, h: &Hysteresis) -> Result<([Table<T
     })
 }
 
-/// Tables of the legs; those that share one share its memory.
+/// Tables of the legs; legs with the same table share its memory.
 fn nodes<T: Real>(
     convert: &Convert<T>,
     h: &Hysteresis,

@@ -1,4 +1,4 @@
-//! Parts of the law that a spec may leave out, or have so many of.
+//! Parts of the law that are optional, or whose number varies.
 
 use std::convert::Infallible;
 use std::fmt::Debug;
@@ -13,10 +13,10 @@ use specgen_runtime::{
     Correction, CorrectionLimit, Damping, GaugeCalibration, ModalDamping, Real, RequestCorrection, Resonator, Snapshot,
 };
 
-/// A part that the spec asks for, or not: it has no words then.
+/// An optional part; without it there are no words.
 #[derive(Debug, Clone, Copy)]
 pub struct Optional<S> {
-    /// Whether the spec asks for it.
+    /// Whether the spec has it.
     pub given: bool,
     part: S,
 }
@@ -56,7 +56,7 @@ impl<T: Real + Debug> ModalDamping<T> for Optional<Damping<T, 6>> {
     }
 }
 
-/// So many values, up to `N`.
+/// Up to `N` values.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct UpTo<X, const N: usize> {
     values: [X; N],
@@ -75,11 +75,11 @@ impl<X, const N: usize> AsMut<[X]> for UpTo<X, N> {
     }
 }
 
-/// What so many output lines show.
+/// Settings of the output lines.
 pub type LineSettings<T> = UpTo<Line<T>, MOST>;
 
 impl<T: Real> LineSettings<T> {
-    /// None for more than there may be.
+    /// None if there are too many.
     pub fn new(given: &[Line<T>]) -> Option<Self> {
         let mut values = [Line::new(); MOST];
         values.get_mut(..given.len())?.copy_from_slice(given);
@@ -143,7 +143,7 @@ pub enum Lines<T: Real> {
 }
 
 impl<T: Real> Lines<T> {
-    /// As many as there are settings for, all low.
+    /// One line for each of the settings, all low.
     pub fn low(settings: &LineSettings<T>) -> Self {
         match settings.count {
             0 => Self::None,

@@ -1,4 +1,4 @@
-//! A platform in task space whose constants are read at run time.
+//! A platform in task space, with constants at run time.
 
 use specgen_ir::constants;
 use specgen_ir::scalar::{Numbers as _, kept};
@@ -112,7 +112,7 @@ fn setpoints<T: Real>(
     Ok(constants::setpoints(convert, &ir.bounds.pose, s, frames, paths))
 }
 
-/// A trajectory; none if it has more ticks than there may be, or too few parts.
+/// A trajectory; none if it has too many ticks, or too few rows.
 fn of_path<T: Real>(convert: &Convert<T>, path: &Path) -> Option<Trajectory<T>> {
     Some(match path {
         Path::Segments { start, segments, ticks, end } => Trajectory::Segments {

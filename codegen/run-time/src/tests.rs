@@ -1,4 +1,4 @@
-//! Constants count: one ulp more in one of them, and a digest, an output or a snapshot differs.
+//! Every constant matters: one ulp more in one of them changes a digest, an output or a snapshot.
 
 mod trial;
 
@@ -15,18 +15,18 @@ use specgen_runtime::Real;
 
 use trial::Trial;
 
-/// A constant as it is converted: the numbers of an array one after the other.
+/// Source location of the conversion of a constant; numbers of an array have the same.
 type Place = &'static Location<'static>;
 
 thread_local! {
-    /// The number that is changed, and how many were converted.
+    /// Index of the number to change, and count of converted numbers.
     static SPOILT: Cell<Option<usize>> = const { Cell::new(None) };
     static COUNT: Cell<usize> = const { Cell::new(0) };
-    /// Where each number was asked for; none of zero.
+    /// Location of each number; none for zero.
     static PLACES: RefCell<Vec<Option<Place>>> = const { RefCell::new(Vec::new()) };
 }
 
-/// A number as [`Convert`](crate::convert::Convert) gives it.
+/// Changes a number of [`Convert`](crate::convert::Convert) by one ulp if it is the selected one.
 #[track_caller]
 pub fn spoilt<T: Real>(value: T) -> T {
     let number = COUNT.replace(COUNT.get() + 1);
@@ -46,7 +46,7 @@ fn here() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
 }
 
-/// What the source converts there, such as `law.lead`.
+/// The converted expression at a location, such as `law.lead`.
 fn name(place: Place, sources: &mut BTreeMap<String, String>) -> String {
     let read = || std::fs::read_to_string(here().join("../..").join(place.file())).unwrap();
     let text = sources.entry(place.file().to_owned()).or_insert_with(read);
@@ -68,7 +68,7 @@ fn name(place: Place, sources: &mut BTreeMap<String, String>) -> String {
 /// Numbers of constants of one name, counted from 0 among those that are not zero.
 type Numbers = BTreeSet<usize>;
 
-/// Constants of a spec by their name: all, and those of which an ulp is not seen.
+/// Number of constants of a spec, and the names of those where an ulp is not seen.
 struct ConstantCounts {
     all: usize,
     unseen: BTreeMap<String, Numbers>,
@@ -81,7 +81,7 @@ fn trial(spec: &str) -> ConstantCounts {
     let places = PLACES.with_borrow(Clone::clone);
     let trial = Trial::of(&compiled, &good);
     let expected = trial.digests(&good, None);
-    assert_eq!(trial.digests(&good, Some(&expected)), expected, "{spec}: a trial that repeats");
+    assert_eq!(trial.digests(&good, Some(&expected)), expected, "{spec}: a repeated trial");
     let (mut found, mut sources) = (ConstantCounts { all: 0, unseen: BTreeMap::new() }, BTreeMap::new());
     let mut counts: BTreeMap<String, usize> = BTreeMap::new();
     for (number, place) in places.iter().enumerate() {
@@ -118,7 +118,7 @@ fn list() -> PathBuf {
     here().join("unseen.txt")
 }
 
-/// Lines of the list that speak of a spec: name and numbers to reason.
+/// Lines of the list for a spec: name and numbers to reason.
 fn listed(spec: &str) -> BTreeMap<(String, String), String> {
     let text = std::fs::read_to_string(list()).unwrap();
     let of_spec = text.split("\n== ").find_map(|part| part.strip_prefix(&format!("{spec}\n"))).unwrap_or_default();
@@ -130,7 +130,7 @@ fn listed(spec: &str) -> BTreeMap<(String, String), String> {
     of_spec.lines().filter(|line| !line.is_empty()).map(line).collect()
 }
 
-/// What is wrong with the lines of the list, with those that would be right; none if they are exact.
+/// Errors in the lines of the list, with the correct lines; none if they are exact.
 fn wrong(unseen: &BTreeMap<String, Numbers>, listed: &BTreeMap<(String, String), String>) -> Option<String> {
     let lines: BTreeSet<(String, String)> =
         unseen.iter().map(|(name, numbers)| (name.clone(), shown(numbers))).collect();
@@ -157,7 +157,7 @@ fn every_constant_but_those_listed_is_seen(spec: &str) {
     }
 }
 
-/// A constant that nothing reads, and one that is read again, are both found.
+/// Both a constant that is no longer seen, and one that is seen again, are reported.
 #[test]
 fn a_list_that_is_not_exact_is_refused() {
     let unseen = |names: &[(&str, &[usize])]| -> BTreeMap<String, Numbers> {

@@ -20,16 +20,16 @@ use super::{
 };
 use crate::support::length;
 
-/// Within this `ramp-down` is taken.
+/// Time within which `ramp-down` takes effect.
 const TAKEN: Duration = Duration::from_secs(1);
 
-/// A host that has the orders and is never silent, until it is dropped or its connection closed.
-struct Kept {
+/// A host in control that is never silent, until it is dropped or its connection is closed.
+struct ControllingHost {
     over: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,
 }
 
-impl Kept {
+impl ControllingHost {
     fn new(mut host: Host) -> Self {
         let over = Arc::new(AtomicBool::new(false));
         let ended = Arc::clone(&over);
@@ -42,7 +42,7 @@ impl Kept {
     }
 }
 
-impl Drop for Kept {
+impl Drop for ControllingHost {
     fn drop(&mut self) {
         self.over.store(true, Ordering::Relaxed);
         if let Some(thread) = self.thread.take() {
@@ -104,7 +104,7 @@ pub fn nobody_keeps_others_from_ramping_down(bench: &Bench) {
     if length(false, true) {
         one_that_only_looks_loses_them(&site);
         let idle: Vec<UnixStream> = (0..8).map(|_| UnixStream::connect(&site.link).unwrap()).collect();
-        let kept = Kept::new(site.run());
+        let kept = ControllingHost::new(site.run());
         site.down("eight idle hosts, and one that has the orders");
         drop((idle, kept));
         under_a_flood(&site);
@@ -163,7 +163,7 @@ fn one_that_never_returns_is_not_waited_for(site: &Site) {
 
 /// `operate stop` is taken while another host has the orders, and returns when the program has ended.
 fn one_without_the_orders_stops_the_program(site: &Site, running: Running) {
-    let kept = Kept::new(site.run());
+    let kept = ControllingHost::new(site.run());
     let stopped = site.operate(&["stop"]).status().unwrap();
     assert!(stopped.success() && !site.link.exists(), "{stopped}");
     let output = running.wait();
@@ -202,7 +202,7 @@ fn under_a_flood(site: &Site) {
     std::thread::scope(|scope| {
         scope.spawn(flood);
         scope.spawn(asking);
-        let kept = Kept::new(site.run());
+        let kept = ControllingHost::new(site.run());
         site.down("a flood of noise and requests");
         drop(kept);
         over.store(true, Ordering::Relaxed);

@@ -18,10 +18,10 @@ use specgen_link::samples::MOST_EVERY;
 
 use super::{Bench, Running, wait_for};
 
-/// What a tick showed, by the record: status, phase, pose, set-point, voltages.
-type Shown = (u32, u8, [[f64; 6]; 3]);
+/// Values of a tick in the record: status, phase, pose, set-point, voltages.
+type TickValues = (u32, u8, [[f64; 6]; 3]);
 
-fn shown(bench: &Bench, bytes: &[u8]) -> BTreeMap<u64, Shown> {
+fn shown(bench: &Bench, bytes: &[u8]) -> BTreeMap<u64, TickValues> {
     let mut machine = bench.machine();
     let (names, scalar) = (machine.output_names(), machine.controller().description().scalar);
     let place = |name: &str| names.iter().position(|known| known == name).unwrap();
@@ -50,8 +50,8 @@ fn check_spread(found: &Spread, values: impl Iterator<Item = f64>) {
 }
 
 /// A row against the ticks of the record.
-fn check_row(row: &Row, tick: u64, every: u32, shown: &BTreeMap<u64, Shown>, motion: &Motion) {
-    let ticks: Vec<&Shown> = (tick..tick + u64::from(every)).map(|tick| &shown[&tick]).collect();
+fn check_row(row: &Row, tick: u64, every: u32, shown: &BTreeMap<u64, TickValues>, motion: &Motion) {
+    let ticks: Vec<&TickValues> = (tick..tick + u64::from(every)).map(|tick| &shown[&tick]).collect();
     let (_, phase, [pose, target, _]) = ticks[ticks.len() - 1];
     let user = |pose: &[f64; 6]| motion.user(&pose.map(|value| f64::from(value as f32))).unwrap();
     assert_eq!((row.phase, row.pose, row.target), (*phase, Some(user(pose)), user(target)), "tick {tick}");
@@ -166,7 +166,7 @@ pub fn hosts_look_on_and_are_no_burden(bench: &Bench) {
                 ["least", "mean", "most"].map(|which| line[column(&format!("{name}_{which}_{unit}"))] as f32);
             Spread { least, mean, most }
         };
-        let of = |value: fn(&Shown) -> f64| {
+        let of = |value: fn(&TickValues) -> f64| {
             (tick..tick + u64::from(ticks)).map(|tick| value(&shown[&tick])).collect::<Vec<_>>()
         };
         check_spread(&spread("error[4]", "rad"), of(|(_, _, [pose, target, _])| target[4] - pose[4]).into_iter());

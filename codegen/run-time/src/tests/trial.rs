@@ -1,4 +1,4 @@
-//! What is run to see a constant: the law and the machine under inputs that go everywhere that a constant is read.
+//! The trial of a constant: runs law and machine with inputs that reach every use of a constant.
 
 use host_sim::controller::{Controller, RestingReadings, Supervised, TickController as _};
 use host_sim::description::Description;
@@ -8,16 +8,16 @@ use specgen_compiler::compile::Compilation;
 use specgen_ir::{Ir, Path, Range};
 use specgen_runtime::Digest;
 
-/// Most ticks of a part.
+/// Largest number of ticks of a part.
 const TICKS: usize = 10_000;
-/// Ticks of the law in a mode, where it goes from one mode to the next.
+/// Ticks in each mode, if a part goes through all modes.
 const MODE: usize = 1_400;
 /// Ticks from one digest to the next.
 const EVERY: usize = 20;
-/// Phase of a machine whose law is at work.
+/// Phase of a running machine.
 const RUNNING: u8 = 2;
 
-/// Uniform from 0 to 1, the same everywhere.
+/// Reproducible uniform random numbers from 0 to 1.
 struct RandomSource(u64);
 
 impl RandomSource {
@@ -33,21 +33,21 @@ impl RandomSource {
 
 /// A part of a trial, from reset.
 enum Part {
-    /// Whether settings at the ends of their ranges are taken.
+    /// Whether settings at the ends of their ranges are accepted.
     Settings(Vec<Vec<u64>>),
-    /// Stretches of the law, each with its settings.
+    /// Runs of the law, each with its settings.
     Law(Vec<(Vec<u64>, Vec<Vec<u64>>)>),
-    /// The machine from power-up through its wiring check; it then plays or moves, and its gauges stand still in the end.
+    /// The machine from power-up through its wiring check. It then plays or moves; at the end its gauges are constant.
     Machine { first: Vec<u64>, then: Vec<u64> },
-    /// The machine from where a good one ran, with these rows.
+    /// The machine from the snapshot of a running one, with these rows.
     Running { state: Vec<u64>, rows: Vec<Vec<u64>> },
 }
 
-/// All parts, those first that see most.
+/// All parts, the most sensitive ones first.
 pub struct Trial(Vec<Part>);
 
 impl Trial {
-    /// Of a good controller.
+    /// The trial for a spec and its unchanged controller.
     pub fn of(compiled: &Compilation, controller: &Controller) -> Self {
         let make = Make { ir: &compiled.ir, compiled, controller, about: controller.description() };
         let mut parts = vec![make.settings(), make.hostile(), make.exact()];
@@ -61,7 +61,7 @@ impl Trial {
         Self(parts)
     }
 
-    /// Digests on the way, until one is not the expected one.
+    /// Digests of the trial, up to the first that differs from the expected one.
     pub fn digests(&self, controller: &Controller, expected: Option<&[u64]>) -> Vec<u64> {
         let mut seen = DigestTrail { digests: Vec::new(), expected };
         for part in &self.0 {
@@ -73,14 +73,14 @@ impl Trial {
     }
 }
 
-/// Digests so far, and those that are expected.
+/// Digests so far, and the expected ones.
 struct DigestTrail<'a> {
     digests: Vec<u64>,
     expected: Option<&'a [u64]>,
 }
 
 impl DigestTrail<'_> {
-    /// Takes one; whether it is another than the expected one.
+    /// Adds a digest; whether it differs from the expected one.
     fn differs(&mut self, digest: u64) -> bool {
         let place = self.digests.len();
         self.digests.push(digest);
@@ -95,7 +95,7 @@ fn of(words: &[u64]) -> u64 {
 }
 
 impl Part {
-    /// Whether a digest was not the expected one.
+    /// Runs the part; whether a digest differs from the expected one.
     fn run(&self, mut controller: Controller, seen: &mut DigestTrail<'_>) -> bool {
         controller.reset();
         match self {
@@ -136,8 +136,8 @@ impl Part {
     }
 }
 
-/// Runs a machine, whose gauges show what its legs move, from power-up for [`TICKS`]: `first` while it is armed, `then` where it runs. Its
-/// snapshot after a thousand ticks in which it ran, or of the end, with its input there; none if a digest was not the expected one.
+/// Runs a machine, whose gauges follow its legs, from power-up for [`TICKS`]: with `first` while it arms, with `then` while it runs.
+/// Returns its snapshot and input after a thousand running ticks, or at the end; none if a digest differs from the expected one.
 fn machine(
     controller: Controller,
     first: &[u64],
@@ -195,12 +195,12 @@ impl Make<'_> {
         self.about.input("gauge[0]").or_else(|_| self.about.input("displacement[0]")).unwrap()
     }
 
-    /// The ends of what a gauge is believed.
+    /// Plausible range of a gauge.
     fn believed(&self, gauge: usize) -> [f64; 2] {
         self.ir.task_space.as_ref().map_or(self.ir.bounds.sensor, |task| task.sensing.raw_limits[gauge])
     }
 
-    /// Nothing is asked for, and gauges that read the middle where they have a calibration, else zero.
+    /// A row without a command. Calibrated gauges read the middle of their range, others zero.
     fn at_rest(&self) -> Vec<u64> {
         let mut row = vec![0; self.about.input_names.len()];
         if self.ir.task_space.as_ref().is_some_and(|task| task.sensing.calibration.is_some()) {
@@ -212,7 +212,7 @@ impl Make<'_> {
         row
     }
 
-    /// The spec's settings with the first two of this value: mode, and where forces come from or what set-points are.
+    /// The spec's settings with these first two values: mode, and source of forces or kind of set-points.
     fn config(&self, first: [u64; 2]) -> Vec<u64> {
         let mut words = self.controller.default_config();
         words[..2].copy_from_slice(&first);
@@ -240,7 +240,7 @@ impl Make<'_> {
         Part::Settings(tried)
     }
 
-    /// Everything that a tick may meet, in one mode after the other.
+    /// All kinds of inputs, in one mode after the other.
     fn hostile(&self) -> Part {
         let model = &self.compiled.model;
         let count = self.modes() as usize * MODE;
@@ -269,7 +269,7 @@ impl Make<'_> {
         )
     }
 
-    /// Position feedback with derivative gains, which no spec here asks for.
+    /// Position feedback with derivative gains, which no spec here has.
     fn damped(&self) -> Part {
         let Part::Law(mut stretches) = self.hostile() else { unreachable!("of the law") };
         for (settings, _) in &mut stretches {
@@ -282,7 +282,8 @@ impl Make<'_> {
         Part::Law(stretches)
     }
 
-    /// Legs that go up and down over their whole range and turn anywhere in it: a platform by its gauges in P, six legs by their set-points.
+    /// Moves legs up and down over their whole range, with random reversals: a platform through its gauges in mode P, six legs through
+    /// their set-points.
     fn sweeps(&self) -> Vec<Part> {
         let platform = self.ir.task_space.is_some();
         let mut draw = RandomSource(5);
@@ -295,7 +296,7 @@ impl Make<'_> {
                         if left[leg] == 0 {
                             left[leg] = 1 + draw.below([6, 20, 60, 120][part]);
                             let [low, high] = if platform { self.believed(leg) } else { self.ir.bounds.leg };
-                            // Of a platform to the ends at once, or by the integral, slowly.
+                            // For a platform, to the ends in one step, or slowly by the integral.
                             let share = if platform { [1.0, 0.2, 0.04, 0.01][part] } else { 1.0 };
                             let way = 0.5 * (1.0 - share) + share * draw.unit();
                             row[place + leg] = self.word(low + (high - low) * way);
@@ -303,7 +304,7 @@ impl Make<'_> {
                         left[leg] -= 1;
                     }
                     if part == 3 && !platform {
-                        // Gauges that agree with nothing, by which the estimates push a leg to both ends.
+                        // Inconsistent gauges, so that the estimates push a leg to both ends.
                         for leg in 0..6 {
                             let [low, high] = self.believed(leg);
                             row[self.gauges() + leg] = self.word(if left[leg] > 40 { low } else { high });
@@ -312,14 +313,14 @@ impl Make<'_> {
                     row.clone()
                 });
                 let rows = rows.collect();
-                // P, or of leg set-points the inverse model alone, in the end with estimates.
+                // Mode P; for leg set-points the inverse model alone, in the last part with estimates.
                 let mode = if part == 3 && !platform { 1 } else { 0 };
                 Part::Law(vec![(self.config([mode, u64::from(!platform)]), rows)])
             })
             .collect()
     }
 
-    /// Words that are exactly a limit, or an ulp or two off it, one a tick.
+    /// Words that are exactly at a limit, or within two ulps of it, one per tick.
     fn exact(&self) -> Part {
         let mut at: Vec<(usize, u64)> = Vec::new();
         let mut six = |place: Option<usize>, values: &dyn Fn(usize) -> Vec<f64>| {
@@ -363,7 +364,7 @@ impl Make<'_> {
             }
             if platform {
                 for (tick, row) in rows.iter_mut().enumerate() {
-                    // A stream, or moves; fresh in every tick.
+                    // A stream, or moves; new in every tick.
                     (row[0], row[2]) = (1 + kind, tick as u64);
                 }
             }
@@ -373,7 +374,7 @@ impl Make<'_> {
         Part::Law(stretches.into())
     }
 
-    /// Every trajectory, played to its end, and once more broken off again and again.
+    /// Every trajectory, once to its end, and once interrupted repeatedly.
     fn trajectories(&self) -> Vec<Part> {
         let Some(task) = &self.ir.task_space else { return Vec::new() };
         let ticks = |path: &Path| match path {
@@ -387,7 +388,7 @@ impl Make<'_> {
                 [None, Some(700)].map(|stop| {
                     let mut rest = self.at_rest();
                     (rest[0], rest[1], rest[2]) = (3, number as u64, 1);
-                    // Its beginning is approached first.
+                    // First the approach to its start.
                     let mut rows = vec![rest; length + TICKS];
                     if let Some(stop) = stop {
                         rows.truncate(TICKS);
@@ -403,7 +404,7 @@ impl Make<'_> {
             .collect()
     }
 
-    /// Moves along each axis alone, which its own limits decide about, broken off by a hold now and then.
+    /// Moves along each axis alone, so that its own limits apply, sometimes interrupted by a hold.
     fn moves(&self) -> Vec<Part> {
         let Some(task) = &self.ir.task_space else { return Vec::new() };
         let place = self.input("setpoint[0]");
@@ -442,7 +443,7 @@ impl Make<'_> {
         (0..6).for_each(|axis| then[setpoint + axis] = self.word(0.1 * bound[axis]));
         let mut nothing = DigestTrail { digests: Vec::new(), expected: None };
         let (state, last) = machine(self.controller.fork(), &first, &then, &mut nothing).unwrap();
-        // Gauges that go on where they were, that stick, drift, leap and ring.
+        // Gauges that stay, drift, jump and ring.
         let mut draw = RandomSource(9);
         let running = (0..6).map(|kind| {
             let mut rows = Vec::with_capacity(TICKS / 2);
@@ -469,7 +470,7 @@ impl Make<'_> {
         });
         let mut parts: Vec<Part> = running.collect();
         if self.ir.task_space.is_some() {
-            // A move along each axis alone, which a hold ends with the limits of a stop.
+            // A move along each axis alone, ended by a hold with the limits of a stop.
             parts.extend((0..6).map(|axis| {
                 let mut row = last.clone();
                 (0..6).for_each(|axis| row[setpoint + axis] = self.word(0.1 * bound[axis]));
