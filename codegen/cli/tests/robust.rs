@@ -6,7 +6,7 @@ use crate::support::{Folder, Run, contents, length};
 use serde_json::Value;
 use specgen::compile::compile;
 use specgen::model::AdaptationMode;
-use specgen::stability::platform::{Estimator, Law};
+use specgen_runtime::{ControlMode, Law};
 
 /// A run of `name` in a report.
 fn machine<'a>(report: &'a Value, name: &str) -> &'a Value {
@@ -72,7 +72,7 @@ fn a_platform_beyond_the_gain_that_the_eigenvalues_allow_diverges_and_below_it_i
     let compiled = compile(&folder.path("reference.toml")).unwrap();
     assert_eq!(compiled.model.adaptation.mode, AdaptationMode::Pcc);
     let margins = &compiled.design.as_ref().unwrap().margins;
-    let limit = margins.iter().find(|one| one.law == Law::Combined(Estimator::Pcc)).unwrap().gain_ratio_limit.unwrap();
+    let limit = margins.iter().find(|one| one.law == ControlMode::PF(Law::Pcc)).unwrap().gain_ratio_limit.unwrap();
     for (gain, stable) in [(0.93 * limit, true), (1.12 * limit, false)] {
         let vary = format!("gain={gain}:{gain}");
         let arguments = ["robust", "reference.toml", "--vary", &vary, "--no-noise", "--replay", "gain"];

@@ -6,7 +6,8 @@ use crate::support::{Folder, Run, contents};
 use serde_json::Value;
 use specgen::compile::{Compilation, compile};
 use specgen::lower::platform;
-use specgen::stability::platform::{Conditions, Law, RestDynamics, Tuning, closed_loop_of};
+use specgen::stability::platform::{Conditions, RestDynamics, Tuning, closed_loop_of};
+use specgen_runtime::ControlMode;
 
 /// The row of a setting in a report.
 fn row<'a>(report: &'a Value, name: &str) -> &'a Value {
@@ -80,7 +81,7 @@ fn ultimate_gain(compiled: &Compilation, axis: usize) -> f64 {
     let stable = |gain: f64| {
         let mut tuning = Tuning::NONE;
         tuning.proportional[axis] = gain * closed_loop.basis.axis_stiffness[axis];
-        closed_loop.spectral_radius(Law::Position, &tuning, &Conditions::NOMINAL) <= 1.0
+        closed_loop.spectral_radius(ControlMode::P, &tuning, &Conditions::NOMINAL) <= 1.0
     };
     let (mut low, mut high) = (0.01, 100.0);
     for _ in 0..40 {

@@ -26,9 +26,9 @@ pub use sensing::{PoseNoise, pose_noise, poses_per_reading, reading_noise};
 pub use supervision::{describe_wiring, single_faults};
 
 use crate::ir::{
-    Bounds, Defaults, Hysteresis, Ir, Law, Load, PlatformDefaults, Scalar, Sensing, SetpointKind, Setpoints, TaskSpace,
+    Bounds, Defaults, Hysteresis, Ir, Load, PlatformDefaults, Scalar, Sensing, SetpointKind, Setpoints, TaskSpace,
 };
-use crate::stability::platform::{Design, RestDynamics};
+use crate::stability::platform::{Design, RestDynamics, start_law};
 use specgen_identify::everett::EverettTable;
 use specgen_language::diagnostic::Diagnostic;
 use specgen_language::model::{self, Model};
@@ -69,11 +69,7 @@ pub fn lower(
     let stroke = model.actuator.stroke;
     let round = |value| scalar.round(value);
     let defaults = Defaults {
-        law: match model.adaptation.mode {
-            model::AdaptationMode::Invhys => Law::Invhys,
-            model::AdaptationMode::Ewma => Law::Ewma,
-            model::AdaptationMode::Pcc => Law::Pcc,
-        },
+        law: start_law(model),
         setpoint: match model.controller.setpoint {
             model::SetpointKind::Pose => SetpointKind::Pose,
             model::SetpointKind::Leg => SetpointKind::Leg,

@@ -376,7 +376,8 @@ pub struct Integrity {
 
 /// The name of a variant.
 fn in_lower_case<S: Serializer>(choice: &impl core::fmt::Debug, serializer: S) -> Result<S::Ok, S::Error> {
-    serializer.serialize_str(&format!("{choice:?}").to_lowercase())
+    let shown = format!("{choice:?}").to_lowercase();
+    serializer.serialize_str(shown.split('(').next().unwrap_or(&shown))
 }
 
 /// Words in hexadecimal; readers that only support `f64` would round numbers.

@@ -1,7 +1,7 @@
 //! Additional constants of a controller in task space.
 
 use serde::Serialize;
-use specgen_runtime::trigger;
+use specgen_runtime::{ControlMode, trigger};
 
 use super::{Interaction, LEGS, Law, Scalar, in_lower_case};
 
@@ -148,18 +148,6 @@ pub struct CorrectionLimit {
     pub step: f64,
 }
 
-/// Control mode.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Mode {
-    /// Position feedback alone.
-    P,
-    /// Feed-forward alone.
-    F,
-    /// Both.
-    PF,
-}
-
 /// Diagonal gains of (7).
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Gains {
@@ -174,9 +162,10 @@ pub struct Gains {
 /// Config of a platform at start-up; code limits are in [`super::Defaults`].
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PlatformDefaults {
-    /// P, F or P/F.
-    pub mode: Mode,
-    /// Run-to-run law of F and P/F.
+    /// Control mode.
+    #[serde(serialize_with = "in_lower_case")]
+    pub mode: ControlMode,
+    /// Run-to-run law of the spec, in a mode without one as well.
     #[serde(serialize_with = "in_lower_case")]
     pub law: Law,
     /// Source of the interaction force.

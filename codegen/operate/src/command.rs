@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use specgen_link::RecorderAction;
 use specgen_link::samples::MOST_EVERY;
+use specgen_runtime::ControlMode;
 use specgen_runtime::supervisor::{Phase, Request};
 use specgen_runtime::trigger::MOST;
 
@@ -126,48 +127,34 @@ pub enum FrameRequest {
     Tool([f64; 3]),
 }
 
-/// A requested mode.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct ModeRequest {
-    /// Whether the mode has pose feedback, and whether it inverts the hysteresis.
-    pub terms: [bool; 2],
-    /// Number of the run-to-run law; the current one if none is given.
-    pub law: Option<u64>,
-}
-
-/// Run-to-run laws by their number.
-const LAWS: [&str; 3] = ["invhys", "ewma", "pcc"];
+/// A requested mode: a name of [`ControlMode::WORDS`], or its first part for the run-to-run law in force.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ModeRequest(String);
 
 impl ModeRequest {
     fn parse(text: &str) -> Result<Self, String> {
-        let (terms, law) = text.split_once('-').map_or((text, None), |(terms, law)| (terms, Some(law)));
-        let law = law.map(|law| LAWS.iter().position(|known| *known == law).map(|place| place as u64));
-        let terms = match terms {
-            "p" => Some([true, false]),
-            "f" => Some([false, true]),
-            "pf" => Some([true, true]),
-            _ => None,
-        };
-        match (terms, law) {
-            (Some(terms), None) => Ok(Self { terms, law: None }),
-            (Some(terms @ [_, true]), Some(Some(law))) => Ok(Self { terms, law: Some(law) }),
-            _ => Err(format!(
-                "expected p, f or pf, the last two optionally with a law, -{}; found `{text}`",
-                LAWS.join(", -")
-            )),
+        if ControlMode::WORDS.iter().any(|(name, _)| *name == text || name.split('-').next() == Some(text)) {
+            return Ok(Self(text.to_owned()));
         }
+        Err(format!(
+            "expected p, f or pf, the last two optionally with a law, -invhys, -ewma or -pcc; found `{text}`"
+        ))
     }
 
     /// The word of the mode; `now` is the current one.
     ///
     /// # Errors
     /// No law is given, and none is active.
-    pub fn word(self, now: u64) -> Result<u64, String> {
-        match (self.terms, self.law.or(now.checked_sub(1).map(|now| now % LAWS.len() as u64))) {
-            ([_, false], _) => Ok(0),
-            ([feeds_back, true], Some(law)) => Ok(1 + law + if feeds_back { LAWS.len() as u64 } else { 0 }),
-            (_, None) => Err(format!("mode P has no run-to-run law to keep: name one, such as pf-{}", LAWS[2])),
-        }
+    pub fn word(&self, now: u64) -> Result<u64, String> {
+        let law = ControlMode::WORDS
+            .iter()
+            .find(|(_, word)| u64::from(*word) == now)
+            .and_then(|(name, _)| name.split_once('-'));
+        let kept = law.map(|(_, law)| format!("{}-{law}", self.0));
+        let found = ControlMode::WORDS.iter().find(|(name, _)| *name == self.0 || kept.as_deref() == Some(*name));
+        found
+            .map(|(_, word)| u64::from(*word))
+            .ok_or_else(|| "mode P has no run-to-run law to keep: name one, such as pf-pcc".to_owned())
     }
 }
 
@@ -396,7 +383,7 @@ mod tests {
             ),
             ("frame tool z=40mm", Some(Command::Frame(Some(FrameRequest::Tool([0.0, 0.0, 0.04]))))),
             ("goto zero", Some(Command::Goto("zero".into()))),
-            ("mode pf-ewma", Some(Command::Mode(ModeRequest { terms: [true, true], law: Some(1) }))),
+            ("mode pf-ewma", Some(Command::Mode(ModeRequest("pf-ewma".to_owned())))),
             (
                 "can-i-go x=1um speed=2um/s",
                 Some(Command::CanIGo { axes: [Some(1e-6), None, None, None, None, None], speed: [Some(2e-6), None] }),

@@ -67,7 +67,7 @@ pub fn control_modes(design: &Design) -> Grid {
     for one in &design.margins {
         let least = one.modes.iter().min_by(|a, b| a.damping_ratio.total_cmp(&b.damping_ratio));
         table.push(vec![
-            one.law.name().to_owned(),
+            one.law.to_string(),
             format!("{:.5}", one.spectral_radius),
             or(one.gain_ratio_limit, "> 10"),
             or(one.gain_margin, "none found"),

@@ -6,10 +6,10 @@ use serde_json::json;
 use specgen_compiler::compile::Compilation;
 use specgen_compiler::lower;
 use specgen_compiler::reach::{self, Reach};
-use specgen_compiler::stability::platform::Law;
 use specgen_language::diagnostic::{Diagnostic, Severity, codes};
 use specgen_language::model::Model;
 use specgen_language::spec::SpecSource;
+use specgen_runtime::ControlMode;
 use specgen_studies::verdict::{Figure, Mark, Subject, Verdict};
 use specgen_studies::verify::Measurement;
 use specgen_toolchain::budget::group;
@@ -212,7 +212,7 @@ fn margin_card(compiled: &Compilation, verdict: &Verdict, mode: u32) -> String {
         };
     }
     slew_row(&mut content);
-    let law = Law::ALL.get(mode as usize).copied().unwrap_or(Law::Position);
+    let law = ControlMode::from_word(u64::from(mode)).unwrap_or(ControlMode::P);
     let own = design.margins.iter().find(|one| one.law == law);
     if let Some((own, settling)) = own.and_then(|own| Some((own, own.settling?))) {
         let least = own.modes.iter().min_by(|a, b| a.damping_ratio.total_cmp(&b.damping_ratio));

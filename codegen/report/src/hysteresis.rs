@@ -7,13 +7,13 @@ use host_sim::controller::{Controller, TickController};
 use host_sim::plant::{LegParameters, LegPlant, Plant};
 use host_sim::platform::PlatformScenario;
 use host_sim::platform::rig::{PlatformRun, Record, RunOptions};
-use host_sim::platform::scenario::{PLATFORM_MODES, select};
+use host_sim::platform::scenario::select;
 use host_sim::table::Line;
 use serde_json::{Value, json};
 use specgen_identify::Report;
 use specgen_language::model::Actuator;
 use specgen_numerics::jacobian;
-use specgen_runtime::Platform;
+use specgen_runtime::{ControlMode, Platform};
 use specgen_studies::reproduce::write::digits;
 
 use super::chart::{Axis, BLUE, Chart, LINE, Note, pairs};
@@ -144,7 +144,7 @@ fn behind(
 ) -> Result<Vec<InverseResidual>, RunError> {
     let mut traced = machine.clone();
     traced.options = RunOptions { record: Record::Trace, ..machine.options.clone() };
-    select(controller, PLATFORM_MODES[1].1)?;
+    select(controller, ControlMode::WORDS[1].1)?;
     let run = own.course.run(&traced, controller)?;
     let of = |points: Vec<(f64, f64)>| {
         let line = Line::fit(&points)?;

@@ -5,8 +5,9 @@ use core::f64::consts::TAU;
 use serde_json::{Value, json};
 use specgen_compiler::compile::Compilation;
 use specgen_compiler::lower;
-use specgen_compiler::stability::platform::{DampedMode, Design, Law, RestDynamics};
+use specgen_compiler::stability::platform::{DampedMode, Design, RestDynamics};
 use specgen_language::model::TaskSpace;
+use specgen_runtime::ControlMode;
 use specgen_studies::reproduce::write::digits;
 
 use super::chart::{Axis, BLUE, Chart, LINE, Note, pairs};
@@ -23,21 +24,21 @@ const LARGEST: f64 = 10.0;
 
 /// A control mode in full.
 #[must_use]
-pub fn name(law: Law) -> String {
-    let name = law.name();
+pub fn name(law: ControlMode) -> String {
+    let name = law.to_string();
     match name.rsplit_once(' ') {
         Some((loops, adapting)) => {
             let word = adapting_name(adapting);
             format!("{loops} with {word}")
         }
-        None => name.to_owned(),
+        None => name,
     }
 }
 
 /// A control mode in short.
 #[must_use]
-pub fn short_name(law: Law) -> String {
-    law.name().replace("invhys", "Invhys").replace("ewma", "EWMA").replace("pcc", "PCC")
+pub fn short_name(law: ControlMode) -> String {
+    law.to_string().replace("invhys", "Invhys").replace("ewma", "EWMA").replace("pcc", "PCC")
 }
 
 /// Full name of an adaptation law: `invhys`, `ewma` or `pcc`.
@@ -57,7 +58,7 @@ pub fn section(compiled: &Compilation, mode: u32, command: &str) -> Section {
     let Some((design, task)) = compiled.design.as_ref().zip(compiled.model.task_space.as_ref()) else {
         return of_legs(compiled, section);
     };
-    let law = Law::ALL.get(mode as usize).copied().unwrap_or(Law::Position);
+    let law = ControlMode::from_word(u64::from(mode)).unwrap_or(ControlMode::P);
     let all = control_modes(compiled, design, law);
     let own = design.margins.iter().find(|margins| margins.law == law);
     let stable = design.margins.iter().filter(|margins| margins.spectral_radius < 1.0).count();
@@ -113,10 +114,10 @@ fn damped(design: &Design) -> String {
     )
 }
 
-fn bode(compiled: &Compilation, design: &Design, task: &TaskSpace, law: Law) -> Option<Vec<Vec<Chart>>> {
+fn bode(compiled: &Compilation, design: &Design, task: &TaskSpace, law: ControlMode) -> Option<Vec<Vec<Chart>>> {
     let rest = RestDynamics::of(&lower::platform(&compiled.model).ok()?);
     let closed_loop = design.closed_loop(&compiled.model, task, &rest)?;
-    let tuning = if law == Law::Position { &design.position } else { &design.combined };
+    let tuning = design.tuning(law);
     let highest = 0.45 / compiled.model.timing.period;
     let decades = libm::log10(highest / LOWEST);
     let frequencies: Vec<f64> =
@@ -183,7 +184,7 @@ fn bode(compiled: &Compilation, design: &Design, task: &TaskSpace, law: Law) -> 
 }
 
 /// Stability limits of λ and gain for each control mode.
-fn control_modes(compiled: &Compilation, design: &Design, own: Law) -> Rows {
+fn control_modes(compiled: &Compilation, design: &Design, own: ControlMode) -> Rows {
     let [low, high] = compiled.model.adaptation.gain_ratio;
     let mut rows: Vec<Value> = Vec::new();
     let mut furthest = LARGEST;

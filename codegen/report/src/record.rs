@@ -14,7 +14,7 @@ use super::spectrum::density;
 use super::tracking::{AXES, LEGS, error_groups, norm, round_up, short};
 use super::verdict::{Sentence, card, text_row, thin, value_row};
 use core::f64::consts::TAU;
-use specgen_compiler::stability::platform::Law;
+use specgen_runtime::ControlMode;
 use specgen_toolchain::budget::group;
 
 const GAUGES: [&str; 6] = ["gauge 0", "gauge 1", "gauge 2", "gauge 3", "gauge 4", "gauge 5"];
@@ -305,7 +305,7 @@ fn errors(model: &Model, run: &Run) -> Section {
 fn spectra(compiled: &Compilation, run: &Run) -> Section {
     let model = &compiled.model;
     let (names, lengths) = if model.task_space.is_some() { (AXES, 3) } else { (LEGS, 6) };
-    let law = Law::ALL.get(run.mode as usize).map_or_else(String::new, |law| margins::name(*law));
+    let law = ControlMode::from_word(u64::from(run.mode)).map_or_else(String::new, margins::name);
     let modes: Vec<f64> =
         compiled.design.iter().flat_map(|design| design.modes.iter().map(|mode| mode.frequency / TAU)).collect();
     let charts = (0..6)

@@ -17,11 +17,11 @@ choice! {
     /// Estimates in use.
     pub enum Law {
         /// None: inverse Preisach model alone.
-        Invhys = 0,
+        Invhys = 0 => "invhys",
         /// δ̂ by (AII.3).
-        Ewma = 1,
+        Ewma = 1 => "ewma",
         /// δ̂ and φ̂ by (AII.5) and (AII.6).
-        Pcc = 2,
+        Pcc = 2 => "pcc",
     }
 }
 

@@ -1,9 +1,11 @@
 //! Active parts of the control law.
 
+use core::fmt;
+
 use crate::adaptation::Law;
 use crate::choice::{Choice, choice};
 
-/// Control mode of section 4.
+/// Control mode of section 4. What is asked of a mode is a field of [`Capabilities`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ControlMode {
     /// P: position tracking (7) on a linear leg, u = q/ρ̂; no hysteresis model, no adaptation.
@@ -14,26 +16,42 @@ pub enum ControlMode {
     PF(Law),
 }
 
-impl ControlMode {
+/// What a control mode does.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Capabilities {
     /// Whether (7) feeds the pose error back.
-    #[inline]
-    #[must_use]
-    pub const fn feeds_back(self) -> bool {
-        !matches!(self, Self::F(_))
-    }
-
-    /// Whether the legs go through the inverse Preisach model.
-    #[inline]
-    #[must_use]
-    pub const fn inverts(self) -> bool {
-        !matches!(self, Self::P)
-    }
-
+    pub feeds_back: bool,
+    /// Whether that feedback has `position_gains` in place of `gains`.
+    pub own_gains: bool,
+    /// Whether the legs go through the inverse Preisach model; if not, they are taken as linear.
+    pub inverts: bool,
     /// Whether active damping, if there is any, is active: only together with the feedback it was designed for.
+    pub damps_modes: bool,
+}
+
+impl ControlMode {
+    /// Names in commands and tables, each with its word, from word 0 on.
+    pub const WORDS: [(&'static str, u32); 7] =
+        [("p", 0), ("f-invhys", 1), ("f-ewma", 2), ("f-pcc", 3), ("pf-invhys", 4), ("pf-ewma", 5), ("pf-pcc", 6)];
+
+    /// Meaning of the words in the documentation of the settings.
+    pub const MEANING: &'static str = "0 P; 1, 2, 3 F with Invhys, EWMA, PCC; 4, 5, 6 P/F with the same.";
+
+    /// Its row in the table of capabilities.
     #[inline]
     #[must_use]
-    pub const fn damps_modes(self) -> bool {
-        matches!(self, Self::PF(_))
+    pub const fn capabilities(self) -> Capabilities {
+        let none = Capabilities { feeds_back: false, own_gains: false, inverts: false, damps_modes: false };
+        match self {
+            Self::P => Capabilities { feeds_back: true, own_gains: true, ..none },
+            Self::F(_) => Capabilities { inverts: true, ..none },
+            Self::PF(_) => Capabilities { feeds_back: true, inverts: true, damps_modes: true, ..none },
+        }
+    }
+
+    /// Every mode, in the order of the words.
+    pub fn all() -> impl Iterator<Item = Self> {
+        (0..).map_while(Self::from_word)
     }
 
     /// Run-to-run law; `Invhys` in a mode without adaptation.
@@ -46,7 +64,7 @@ impl ControlMode {
         }
     }
 
-    /// 0 P; 1, 2, 3 F with Invhys, EWMA, PCC; 4, 5, 6 P/F with the same.
+    /// Its word; see [`ControlMode::MEANING`].
     #[inline]
     #[must_use]
     pub const fn word(self) -> u64 {
@@ -70,6 +88,17 @@ impl ControlMode {
             6 => Self::PF(Law::Pcc),
             _ => return None,
         })
+    }
+}
+
+/// As users write it, such as `P/F pcc`.
+impl fmt::Display for ControlMode {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::P => f.write_str("P"),
+            Self::F(law) => write!(f, "F {}", law.name()),
+            Self::PF(law) => write!(f, "P/F {}", law.name()),
+        }
     }
 }
 
@@ -115,10 +144,10 @@ mod tests {
 
     #[test]
     fn words_read_back_and_others_are_refused() {
-        for word in 0..7 {
-            assert_eq!(ControlMode::from_word(word).map(ControlMode::word), Some(word));
+        assert_eq!(ControlMode::all().count(), ControlMode::WORDS.len());
+        for (place, (mode, (_, word))) in (0..).zip(ControlMode::all().zip(ControlMode::WORDS)) {
+            assert_eq!((mode.word(), word), (place, place as u32));
         }
-        assert_eq!(ControlMode::from_word(7), None);
         for word in 0..3 {
             assert_eq!(Interaction::from_word(word).map(Interaction::word), Some(word));
         }

@@ -7,19 +7,15 @@ use super::table::{MachiningTable, PoseRow, PoseTable};
 use crate::closed_loop::{Preparation, RunError};
 use crate::controller::TickController;
 use crate::trajectory::PoseTrajectory;
+use specgen_runtime::ControlMode;
 
 pub use crate::scenario::select;
 
-/// Modes of a platform controller with the value of the `mode` word: P, F and P/F with the inverse hysteresis alone, with
-/// EWMA and with PCC.
-pub const PLATFORM_MODES: [(&str, u32); 7] =
-    [("p", 0), ("f-invhys", 1), ("f-ewma", 2), ("f-pcc", 3), ("pf-invhys", 4), ("pf-ewma", 5), ("pf-pcc", 6)];
-
 /// The modes of Tables 5 to 8.
-pub const FREE_MODES: [(&str, u32); 3] = [PLATFORM_MODES[4], PLATFORM_MODES[5], PLATFORM_MODES[6]];
+pub const FREE_MODES: [(&str, u32); 3] = [ControlMode::WORDS[4], ControlMode::WORDS[5], ControlMode::WORDS[6]];
 
 /// The modes of Table 9.
-pub const MACHINING_MODES: [(&str, u32); 2] = [PLATFORM_MODES[0], PLATFORM_MODES[6]];
+pub const MACHINING_MODES: [(&str, u32); 2] = [ControlMode::WORDS[0], ControlMode::WORDS[6]];
 
 /// A trajectory with its name in tables.
 pub struct NamedTrajectory<'a> {

@@ -2,10 +2,11 @@
 
 use host_sim::controller::TickController;
 use host_sim::platform::rig::{Bench as Rig, Command, Record, Request};
-use host_sim::platform::scenario::{PLATFORM_MODES, select};
+use host_sim::platform::scenario::select;
 use host_sim::platform::{PlatformScenario, Specimen, UserFrames};
 use host_sim::trajectory::{PaperPath, PaperPose, PoseTarget, PoseTrajectory};
 use specgen::machine::{self, on_board};
+use specgen_runtime::ControlMode;
 use specgen_tests::{length, worse};
 
 use super::bench::{BIAS, Bench, PERIOD, in_parallel, reference_machine};
@@ -65,7 +66,7 @@ fn an_over_range_demand_leaves_nothing_behind() {
     let mut scenario = bench.scenario();
     scenario.options.record = Record::Samples;
     let mut controller = bench.controller();
-    for (name, mode) in length(&[6][..], &[0, 4, 5, 6]).iter().map(|mode| PLATFORM_MODES[*mode]) {
+    for (name, mode) in length(&[6][..], &[0, 4, 5, 6]).iter().map(|mode| ControlMode::WORDS[*mode]) {
         let mut words = controller.default_config();
         for (word, value) in [("mode", f64::from(mode)), ("code_max", (LOWERED / LSB).floor())] {
             controller.description().set_config(&mut words, word, value).expect("a setting");

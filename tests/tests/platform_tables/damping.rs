@@ -6,8 +6,9 @@ use std::sync::OnceLock;
 use host_sim::platform::rig::{Bench as Rig, Request};
 use host_sim::platform::{Specimen, WorkPart};
 use host_sim::trajectory::PoseTarget;
-use specgen::stability::platform::{ClosedLoop, Conditions, Estimator, Law, Tuning};
+use specgen::stability::platform::{ClosedLoop, Conditions, Tuning};
 use specgen::tuning::relay;
+use specgen_runtime::{ControlMode, Law};
 use specgen_tests::{length, worse};
 
 use super::bench::{Bench, DAMPED, PERIOD, in_parallel, reference_machine};
@@ -32,11 +33,11 @@ fn every_mode_is_damped_within_the_bounds_of_the_design() {
         assert!(found.slow[1] <= 0.5, "|S| at 50 Hz");
     }
     let closed_loop = closed_loop(bench);
-    for adapting in [Estimator::Invhys, Estimator::Ewma, Estimator::Pcc] {
+    for adapting in [Law::Invhys, Law::Ewma, Law::Pcc] {
         for step in (0..=20).step_by(length(5, 1)) {
             let stiffness = 0.6 + 0.05 * f64::from(step);
             let conditions = Conditions { stiffness, ..Conditions::NOMINAL };
-            let radius = closed_loop.spectral_radius(Law::Combined(adapting), &design.combined, &conditions);
+            let radius = closed_loop.spectral_radius(ControlMode::PF(adapting), &design.combined, &conditions);
             assert!(radius < 1.0, "stiffness x {stiffness}: {radius}");
         }
     }
@@ -114,7 +115,7 @@ fn damped_machines_follow_and_hold_better_than_undamped_ones() {
 
 /// Where the loop with a gain on one axis alone becomes unstable, over the stiffness of that axis, by eigenvalues.
 fn limit(closed_loop: &ClosedLoop, axis: usize) -> f64 {
-    let law = Law::Combined(Estimator::Invhys);
+    let law = ControlMode::PF(Law::Invhys);
     let stable = |gain: f64| {
         let mut tuning = Tuning::NONE;
         tuning.proportional[axis] = gain * closed_loop.basis.axis_stiffness[axis];

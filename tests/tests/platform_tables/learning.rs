@@ -15,8 +15,9 @@ use specgen::learning::{
 };
 use specgen::machine;
 use specgen::robust::{Deviation, Factors};
-use specgen::stability::platform::{Conditions, Estimator, Law, Tuning};
+use specgen::stability::platform::{Conditions, Tuning};
 use specgen_runtime::playback::Knot;
+use specgen_runtime::{ControlMode, Law};
 use specgen_tests::length;
 
 use super::bench::{Bench, PERIOD, in_parallel, scenario};
@@ -129,7 +130,7 @@ fn a_path_with_corners_is_learned_to_nanometres_in_five_passes() {
 #[test]
 fn the_channel_of_a_correction_is_that_of_the_time_domain() {
     let closed_loop = closed_loop(plays());
-    let law = Law::Feedforward(Estimator::Invhys);
+    let law = ControlMode::F(Law::Invhys);
     for hertz in [361.0, 20.0, 700.0].into_iter().take(length(1, 3)) {
         let angle = TAU * hertz * PERIOD;
         let ticks = 20_000_u32;

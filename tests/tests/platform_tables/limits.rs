@@ -5,8 +5,9 @@ use host_sim::platform::rig::{Noise, Record, RunOptions};
 use host_sim::platform::{PlatformScenario, Specimen};
 use host_sim::trajectory::{PoseTarget, PoseTrajectory};
 use specgen::lower::platform;
-use specgen::stability::platform::{ClosedLoop, Conditions, Estimator, Law, RestDynamics, Tuning};
+use specgen::stability::platform::{ClosedLoop, Conditions, RestDynamics, Tuning};
 
+use specgen_runtime::{ControlMode, Law};
 use specgen_tests::{length, worse};
 
 use super::bench::{BIAS, Bench, PERIOD, Pair, SEED, in_parallel, median, plants, random_machines};
@@ -95,7 +96,7 @@ pub fn closed_loop(bench: &Bench) -> ClosedLoop {
 }
 
 /// Predicted and simulated factors on a tuning at which a law becomes unstable.
-fn limit(bench: &Bench, (mode, law): (u32, Law), tuning: &Tuning, latency: usize) -> [f64; 2] {
+fn limit(bench: &Bench, (mode, law): (u32, ControlMode), tuning: &Tuning, latency: usize) -> [f64; 2] {
     let design = bench.design();
     let closed_loop = closed_loop(bench);
     let conditions = Conditions { delay: latency as f64, ..Conditions::NOMINAL };
@@ -117,9 +118,9 @@ fn limit(bench: &Bench, (mode, law): (u32, Law), tuning: &Tuning, latency: usize
     [predicted, (low * high).sqrt()]
 }
 
-const EWMA: (u32, Law) = (2, Law::Feedforward(Estimator::Ewma));
-const PCC: (u32, Law) = (3, Law::Feedforward(Estimator::Pcc));
-const COMBINED: (u32, Law) = (6, Law::Combined(Estimator::Pcc));
+const EWMA: (u32, ControlMode) = (2, ControlMode::F(Law::Ewma));
+const PCC: (u32, ControlMode) = (3, ControlMode::F(Law::Pcc));
+const COMBINED: (u32, ControlMode) = (6, ControlMode::PF(Law::Pcc));
 
 #[test]
 fn predicted_limits_are_those_of_the_machine() {
@@ -189,11 +190,11 @@ fn no_start_rule_is_unstable_on_any_machine() {
         let mut bad = Vec::new();
         for (base, bench, tuning) in bases {
             let mut controller = bench.controller();
-            for (mode, law) in [(0, Law::Position), PCC, (5, Law::Combined(Estimator::Ewma)), COMBINED] {
+            for (mode, law) in [(0, ControlMode::P), PCC, (5, ControlMode::PF(Law::Ewma)), COMBINED] {
                 let position = &bench.design().position;
                 let setting = Setting { mode, tuning: &tuning, position, latency: 0 };
                 if !settles(&bench.specimen, &mut controller, &setting) {
-                    bad.push(format!("machine {number}, {base}, {}", law.name()));
+                    bad.push(format!("machine {number}, {base}, {}", law));
                 }
             }
         }

@@ -7,9 +7,10 @@ use host_sim::forc::{ReversalRecord, ReversalRow};
 use host_sim::plant::{LegParameters, NoiseParameters};
 use host_sim::platform::Specimen;
 use host_sim::platform::rig::{Noise, Record, RunOptions};
-use host_sim::platform::scenario::{PLATFORM_MODES, select};
+use host_sim::platform::scenario::select;
 use host_sim::platform::{PlatformParameters, PlatformScenario};
 use host_sim::trajectory::{PoseTarget, PoseTrajectory};
+use specgen_runtime::ControlMode;
 use specgen_tests::{Emitted, length, worse};
 
 use super::bench::PERIOD;
@@ -162,7 +163,7 @@ fn allowed(mode: u32, stem: &str) -> f64 {
 fn every_tick_is_that_of_the_reference_controller() {
     let mut comparison = Comparison::new("tables-oracle");
     // One of P, F and P/F in the short run.
-    for mode in PLATFORM_MODES.into_iter().step_by(length(3, 1)) {
+    for mode in ControlMode::WORDS.into_iter().step_by(length(3, 1)) {
         for (stem, largest) in comparison.run(mode, None) {
             assert!(largest <= allowed(mode.1, stem), "{}: {stem} differs by {largest:e}", mode.0);
         }
@@ -184,7 +185,7 @@ fn a_setting_off_by_a_hundredth_is_seen() {
     .into_iter()
     .step_by(length(3, 1))
     {
-        let mode = PLATFORM_MODES[mode];
+        let mode = ControlMode::WORDS[mode];
         let [.., (_, requested)] = comparison.run(mode, Some((setting, 1.01)));
         assert!(requested > allowed(mode.1, "requested"), "{setting}: {requested:e}");
     }

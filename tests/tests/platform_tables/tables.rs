@@ -1,9 +1,10 @@
 //! Tables 5 to 9: the reference machine, and random ones.
 
-use host_sim::platform::scenario::{FREE_MODES, MACHINING_MODES, NamedTrajectory, PLATFORM_MODES};
+use host_sim::platform::scenario::{FREE_MODES, MACHINING_MODES, NamedTrajectory};
 use host_sim::platform::table::{MachiningTable, PoseRow, PoseTable, paper_rms};
 use host_sim::platform::{Specimen, WorkPart};
 use host_sim::trajectory::{PaperPath, PaperPose};
+use specgen_runtime::ControlMode;
 use specgen_tests::{length, repository, worse};
 
 use super::bench::{Bench, in_parallel, median, plants, random_machines, reference_machine};
@@ -21,7 +22,7 @@ fn free_motion(bench: &Bench, frequencies: &[f64]) -> PoseTable {
             let trajectory = PaperPose::corrected(path, frequency);
             let named = [NamedTrajectory { name, frequency, trajectory: &trajectory }];
             // No ranking is asked of F alone but in case 1 above the noise.
-            let alone: &[_] = if name == "case-1" && frequency > 0.5 { &PLATFORM_MODES[2..4] } else { &[] };
+            let alone: &[_] = if name == "case-1" && frequency > 0.5 { &ControlMode::WORDS[2..4] } else { &[] };
             let modes: Vec<_> = FREE_MODES.iter().chain(alone).copied().collect();
             table.rows.extend(scenario.free_motion(&mut controller, &modes, &named).expect("a run").rows);
         }

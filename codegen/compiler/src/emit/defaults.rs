@@ -7,7 +7,7 @@ use proc_macro2::{Ident, TokenStream};
 use quote::{format_ident, quote};
 
 use super::literal;
-use crate::ir::{Gains, Ir, Mode, PlatformDefaults};
+use crate::ir::{Gains, Ir, PlatformDefaults};
 
 pub fn emit(ir: &Ir) -> TokenStream {
     let leg_gain = literal::real(ir.scalar, ir.scalar.round(ir.defaults.leg_gain));
@@ -63,8 +63,9 @@ fn platform(ir: &Ir, d: &PlatformDefaults) -> (TokenStream, TokenStream) {
     let real = |value| literal::real(ir.scalar, value);
     let six = |values: &[f64; 6]| literal::reals(ir.scalar, values);
     let (law, mode, interaction) = (variant(&d.law), variant(&d.mode), variant(&d.interaction));
-    let with_law = (d.mode != Mode::P).then(|| quote! { (Law::#law) });
-    let import_law = (d.mode != Mode::P).then(|| quote! { , Law });
+    let has_law = format!("{:?}", d.mode).contains('(');
+    let with_law = has_law.then(|| quote! { (Law::#law) });
+    let import_law = has_law.then(|| quote! { , Law });
     let gains = |of: &Gains| literal::constant!(ir.scalar, gains, of);
     let (combined, position) = (gains(&d.gains), gains(&d.position_gains));
     let (stiffness, rest) = (six(&d.environment_stiffness), six(&d.environment_rest));
@@ -103,7 +104,8 @@ fn platform(ir: &Ir, d: &PlatformDefaults) -> (TokenStream, TokenStream) {
     (imports, constants)
 }
 
-/// The name of a variant, which is that of the runtime.
+/// The name of a variant, without its fields.
 fn variant(value: &impl Debug) -> Ident {
-    format_ident!("{}", format!("{value:?}"))
+    let shown = format!("{value:?}");
+    format_ident!("{}", shown.split('(').next().unwrap_or(&shown))
 }

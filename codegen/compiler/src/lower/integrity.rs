@@ -1,12 +1,11 @@
 //! Checksum of tables and settings, which the controller recomputes at start.
 
 use super::Origin;
-use specgen_runtime::{ControlMode, Crc32};
+use specgen_runtime::Crc32;
 use specgen_toolchain::{ASSUMED_MARK, ASSUMED_SEPARATOR, IDENTITY_MARK, sha256};
 
 use crate::ir::{
-    Actuation, Defaults, Gains, Hysteresis, Integrity, Mode, Path, PlatformDefaults, RateModel, Scalar, Segment,
-    TaskSpace,
+    Actuation, Defaults, Gains, Hysteresis, Integrity, Path, PlatformDefaults, RateModel, Scalar, Segment, TaskSpace,
 };
 
 /// Digest of the inputs of the controller: the text of the spec (line ends as `\n`), and name and text of the files that it
@@ -121,14 +120,9 @@ fn of_platform(
     defaults: &Defaults,
     d: &PlatformDefaults,
 ) -> Vec<u64> {
-    let mode = match d.mode {
-        Mode::P => ControlMode::P,
-        Mode::F => ControlMode::F(d.law),
-        Mode::PF => ControlMode::PF(d.law),
-    };
     let gains = |gains: &Gains| [gains.proportional, gains.integral, gains.derivative].concat();
     let mut settings = vec![
-        mode.word(),
+        d.mode.word(),
         d.interaction.word(),
         word(&d.level_weight),
         word(&d.drift_weight),

@@ -1,5 +1,6 @@
 //! The table of permitted settings: the ranges of values that a spec could have.
 
+use specgen_runtime::ControlMode;
 use specgen_runtime::snapshot::{LARGEST, LARGEST_PLACE};
 use specgen_runtime::trigger::LONGEST;
 
@@ -78,9 +79,9 @@ pub(super) fn lower(
             let mut settings = vec![
                 one(
                     "mode",
-                    Range::Whole(0, 6),
+                    Range::Whole(0, ControlMode::WORDS.len() as i32 - 1),
                     "",
-                    "0 P; 1, 2, 3 F with Invhys, EWMA, PCC; 4, 5, 6 P/F with the same.",
+                    ControlMode::MEANING,
                     "`control.mode`, `adaptation.mode`",
                 ),
                 one(

@@ -2,8 +2,7 @@
 
 use super::linear;
 use crate::ir::{
-    ControlLaw, CorrectionLimit, Gains, Interaction, LEGS, Law, Mode, Notch, PlatformDefaults, Resonator, Scalar,
-    Section,
+    ControlLaw, CorrectionLimit, Gains, Interaction, LEGS, Notch, PlatformDefaults, Resonator, Scalar, Section,
 };
 use crate::stability::platform::{self as design, Design, RestDynamics};
 use specgen_language::model::{self, Model};
@@ -130,16 +129,8 @@ pub(super) fn defaults(model: &Model, task: &model::TaskSpace, scalar: Scalar, d
         derivative: tuning.derivative.map(round),
     };
     PlatformDefaults {
-        mode: match task.mode {
-            model::ControlMode::P => Mode::P,
-            model::ControlMode::F => Mode::F,
-            model::ControlMode::PF => Mode::PF,
-        },
-        law: match model.adaptation.mode {
-            model::AdaptationMode::Invhys => Law::Invhys,
-            model::AdaptationMode::Ewma => Law::Ewma,
-            model::AdaptationMode::Pcc => Law::Pcc,
-        },
+        mode: design::start_mode(model, task),
+        law: design::start_law(model),
         interaction: match task.interaction {
             model::Interaction::None => Interaction::Neglected,
             model::Interaction::Modelled => Interaction::Modelled,

@@ -23,16 +23,16 @@ mod sampled;
 mod search;
 
 use serde::Serialize;
-use specgen_runtime::Platform;
+use specgen_runtime::{ControlMode, Platform};
 
 use specgen_language::diagnostic::Diagnostic;
-use specgen_language::model::{AdaptationMode, ControlMode, Gains, Interaction, Model, TaskSpace};
+use specgen_language::model::{Gains, Interaction, Model, TaskSpace};
 use specgen_numerics::{Matrix6, jacobian, mass_matrix};
 
 pub use super::LARGEST_RADIUS;
 pub use closed_loop::{ClosedLoop, Conditions};
 pub use damping::{ActiveDamping, DampedMode, SLOW};
-pub use law::{Estimator, Law, Tuning};
+pub use law::{LoopKind, Tuning, start_law, start_mode};
 pub use margins::{ClosedMode, ModeMargins};
 pub use modes::ModalBasis;
 pub use notch::{Biquad, Notch};
@@ -117,15 +117,14 @@ pub fn design(model: &Model, task: &TaskSpace, plant: &RestDynamics) -> Result<D
     let limit = bandwidth_limit(&closed_loop);
     let given = task.gains.as_ref().map(gains);
     let given = rule::TuningKeys { gains: given.as_ref(), bandwidths: task.adaptation };
-    let damping = task.active_damping.then(|| rule::damped(&mut closed_loop, limit, adapting(model)));
+    let damping = task.active_damping.then(|| rule::damped(&mut closed_loop, limit, start_law(model)));
     let start = damping.as_ref().map(|(_, tuning)| tuning);
     let combined = rule::combined(&closed_loop, limit, given, start, ratios);
     let position = task.position_gains.as_ref().map_or_else(|| rule::alone(&closed_loop, limit, ratios), gains);
     refusal::check(model, task, &closed_loop, &combined, &position)?;
-    let margins: Vec<ModeMargins> = Law::ALL
-        .into_iter()
+    let margins: Vec<ModeMargins> = ControlMode::all()
         .map(|law| {
-            let tuning = if law == Law::Position { &position } else { &combined };
+            let tuning = if law.capabilities().own_gains { &position } else { &combined };
             ModeMargins::of(&closed_loop, law, tuning, ratios)
         })
         .collect();
@@ -169,12 +168,15 @@ pub fn lead(model: &Model, task: &TaskSpace, basis: &ModalBasis) -> f64 {
 impl Design {
     /// The law at start-up, and its tuning.
     #[must_use]
-    pub fn law(&self, model: &Model, task: &TaskSpace) -> (Law, &Tuning) {
-        match task.mode {
-            ControlMode::P => (Law::Position, &self.position),
-            ControlMode::F => (Law::Feedforward(adapting(model)), &self.combined),
-            ControlMode::PF => (Law::Combined(adapting(model)), &self.combined),
-        }
+    pub fn law(&self, model: &Model, task: &TaskSpace) -> (ControlMode, &Tuning) {
+        let mode = start_mode(model, task);
+        (mode, self.tuning(mode))
+    }
+
+    /// The numbers of a mode.
+    #[must_use]
+    pub fn tuning(&self, mode: ControlMode) -> &Tuning {
+        if mode.capabilities().own_gains { &self.position } else { &self.combined }
     }
 
     /// The closed loop of the spec without tuning; `task` is its `[control]`.
@@ -207,15 +209,6 @@ pub fn closed_loop_of(model: &Model, task: &TaskSpace, plant: &RestDynamics) -> 
     })
 }
 
-/// The run-to-run law at start-up.
-fn adapting(model: &Model) -> Estimator {
-    match model.adaptation.mode {
-        AdaptationMode::Invhys => Estimator::Invhys,
-        AdaptationMode::Ewma => Estimator::Ewma,
-        AdaptationMode::Pcc => Estimator::Pcc,
-    }
-}
-
 fn gains(gains: &Gains) -> Tuning {
     Tuning {
         proportional: gains.proportional,
@@ -239,7 +232,7 @@ fn nominal_conditions(closed_loop: &ClosedLoop, [low, high]: [f64; 2]) -> Vec<Co
     all
 }
 
-fn worst_radius(closed_loop: &ClosedLoop, law: Law, tuning: &Tuning, conditions: &[Conditions]) -> f64 {
+fn worst_radius(closed_loop: &ClosedLoop, law: ControlMode, tuning: &Tuning, conditions: &[Conditions]) -> f64 {
     let mut largest = 0.0;
     for one in conditions {
         let radius = closed_loop.spectral_radius(law, tuning, one);

@@ -1,7 +1,8 @@
 //! What the design gives, refuses and points out.
 
-use specgen_compiler::stability::platform::{Design, Law, Tuning, describe, design};
+use specgen_compiler::stability::platform::{Design, Tuning, describe, design};
 use specgen_language::model::{AdaptationMode, Gains, Interaction, Model, TaskSpace};
+use specgen_runtime::ControlMode;
 
 use super::study::{model, rest};
 
@@ -204,8 +205,8 @@ fn the_design_is_the_same_every_time_and_does_not_depend_on_the_numbering_of_leg
 #[test]
 fn the_report_names_every_mode() {
     let text = describe(&designed(|_, _| ()).unwrap());
-    for law in Law::ALL {
-        assert!(text.lines().any(|line| line.trim_start().starts_with(law.name())), "{text}");
+    for law in ControlMode::all() {
+        assert!(text.lines().any(|line| line.trim_start().starts_with(&law.to_string())), "{text}");
     }
     assert!(text.contains("360.5, 360.5, 428.1, 428.1, 614.9, 794.9 Hz"), "{text}");
 }

@@ -14,8 +14,9 @@ use std::f64::consts::TAU;
 
 use simulation::{Run, settles};
 use specgen_compiler::stability::platform::{
-    ClosedLoop, Conditions, Estimator, Law, ModalBasis, RestDynamics, Tuning, bandwidth_limit, closed_loop_of, design,
+    ClosedLoop, Conditions, ModalBasis, RestDynamics, Tuning, bandwidth_limit, closed_loop_of, design,
 };
+use specgen_runtime::{ControlMode, Law};
 use study::{model, rest};
 
 /// How much of what only gains by length is run: the long length in the full run.
@@ -23,9 +24,9 @@ fn length<T>(short: T, long: T) -> T {
     if std::env::var_os("SPECGEN_FULL").is_some() { long } else { short }
 }
 
-const EWMA: Law = Law::Feedforward(Estimator::Ewma);
-const PCC: Law = Law::Feedforward(Estimator::Pcc);
-const COMBINED: Law = Law::Combined(Estimator::Pcc);
+const EWMA: ControlMode = ControlMode::F(Law::Ewma);
+const PCC: ControlMode = ControlMode::F(Law::Pcc);
+const COMBINED: ControlMode = ControlMode::PF(Law::Pcc);
 
 /// First crossing of radius 1 along a factor, by a scan and bisection of its own.
 fn limit(low: f64, high: f64, radius: impl Fn(f64) -> f64) -> f64 {
@@ -130,7 +131,7 @@ fn ewma_and_pcc_limits_are_the_linear_columns_of_the_study() {
 
 #[test]
 fn margins_of_the_study_s_hand_gains_are_found_again() {
-    let gain = |name: &str, law: Law, delay: f64| {
+    let gain = |name: &str, law: ControlMode, delay: f64| {
         let (tuning, closed_loop) = base(name);
         let conditions = Conditions { delay, ..Conditions::NOMINAL };
         limit(1.0, 10.0, |g| closed_loop.spectral_radius(law, &tuning.scaled(g, g), &conditions))
@@ -140,8 +141,8 @@ fn margins_of_the_study_s_hand_gains_are_found_again() {
     agrees("N", gain("N", COMBINED, 0.0), 3.49, 0.025, 0.005);
     agrees("U late", gain("U", COMBINED, 1.0), 2.18, 0.025, 0.005);
     agrees("N late", gain("N", COMBINED, 1.0), 2.85, 0.025, 0.005);
-    agrees("P alone, N", gain("P alone, N", Law::Position, 0.0), 2.04, 0.025, 0.005);
-    agrees("P alone, N late", gain("P alone, N", Law::Position, 1.0), 1.68, 0.025, 0.005);
+    agrees("P alone, N", gain("P alone, N", ControlMode::P, 0.0), 2.04, 0.025, 0.005);
+    agrees("P alone, N late", gain("P alone, N", ControlMode::P, 1.0), 1.68, 0.025, 0.005);
     // λ and the range of k_a.
     let (tuning, closed_loop) = base("N");
     let ratio = limit(1.0, 10.0, |gain_ratio| {
@@ -171,7 +172,7 @@ fn damping_by_velocity_needs_a_fast_loop_without_delay() {
     };
     let radius = |rate: f64, factor: f64, delay: f64| {
         let conditions = Conditions { delay, ..Conditions::NOMINAL };
-        loop_at(rate, 0.02, None).spectral_radius(Law::Combined(Estimator::Ewma), &kv(factor), &conditions)
+        loop_at(rate, 0.02, None).spectral_radius(ControlMode::PF(Law::Ewma), &kv(factor), &conditions)
     };
     assert!(radius(1e4, 1.0, 0.0) < 1.0);
     assert!(radius(2e3, 1.0, 0.0) > 1.0);
@@ -182,7 +183,7 @@ fn damping_by_velocity_needs_a_fast_loop_without_delay() {
         limit(20.0, 5e3, |level| {
             let tuning = Tuning { level_bandwidth: level, ..kv(factor) };
             let conditions = Conditions { delay, ..Conditions::NOMINAL };
-            closed_loop.spectral_radius(Law::Combined(Estimator::Ewma), &tuning, &conditions)
+            closed_loop.spectral_radius(ControlMode::PF(Law::Ewma), &tuning, &conditions)
         })
     };
     let found =
@@ -194,12 +195,12 @@ fn damping_by_velocity_needs_a_fast_loop_without_delay() {
 }
 
 /// The controller's numbers for the simulation.
-fn run_of(closed_loop: &ClosedLoop, law: Law, tuning: &Tuning, conditions: &Conditions) -> Run {
-    let feeds_back = !matches!(law, Law::Feedforward(_));
+fn run_of(closed_loop: &ClosedLoop, law: ControlMode, tuning: &Tuning, conditions: &Conditions) -> Run {
+    let feeds_back = !matches!(law, ControlMode::F(_));
     let gains = |gains: [f64; 6]| if feeds_back { gains } else { [0.0; 6] };
     let adapting = match law {
-        Law::Position => Estimator::Invhys,
-        Law::Feedforward(adapting) | Law::Combined(adapting) => adapting,
+        ControlMode::P => Law::Invhys,
+        ControlMode::F(adapting) | ControlMode::PF(adapting) => adapting,
     };
     Run {
         rate: 1.0 / closed_loop.period,
@@ -214,8 +215,8 @@ fn run_of(closed_loop: &ClosedLoop, law: Law, tuning: &Tuning, conditions: &Cond
         integral: gains(tuning.integral),
         derivative: gains(tuning.derivative),
         velocity_cutoff: closed_loop.velocity_cutoff,
-        level_weight: if adapting == Estimator::Invhys { 0.0 } else { tuning.level_bandwidth * closed_loop.period },
-        drift_weight: if adapting == Estimator::Pcc { tuning.drift_bandwidth * closed_loop.period } else { 0.0 },
+        level_weight: if adapting == Law::Invhys { 0.0 } else { tuning.level_bandwidth * closed_loop.period },
+        drift_weight: if adapting == Law::Pcc { tuning.drift_bandwidth * closed_loop.period } else { 0.0 },
         contact: if conditions.touching { closed_loop.environment } else { [0.0; 6] },
         measured: closed_loop.measured && conditions.touching,
         seconds: 2.0,
@@ -226,7 +227,7 @@ fn run_of(closed_loop: &ClosedLoop, law: Law, tuning: &Tuning, conditions: &Cond
 fn limit_holds_in_simulation(
     what: &str,
     closed_loop: &ClosedLoop,
-    law: Law,
+    law: ControlMode,
     along: impl Fn(f64) -> (Tuning, Conditions),
 ) {
     let found = limit(1.0, 30.0, |factor| {
@@ -252,7 +253,7 @@ fn predicted_limits_hold_in_a_fine_step_simulation() {
         let closed_loop = loop_at(rate, 0.02, notch);
         let tuning = Tuning { level_bandwidth: 100.0, drift_bandwidth: 4.4, ..Tuning::NONE };
         for law in [EWMA, PCC] {
-            let what = format!("{} at {rate} Hz, notch {notch:?}", law.name());
+            let what = format!("{} at {rate} Hz, notch {notch:?}", law);
             limit_holds_in_simulation(&what, &closed_loop, law, |g| (tuning.scaled(1.0, g), nominal));
         }
     }
@@ -267,14 +268,14 @@ fn predicted_limits_hold_in_a_fine_step_simulation() {
         }
     }
     let (alone, position) = base("P alone, N");
-    limit_holds_in_simulation("P", &position, Law::Position, |g| (alone.scaled(g, g), nominal));
+    limit_holds_in_simulation("P", &position, ControlMode::P, |g| (alone.scaled(g, g), nominal));
     if length(true, false) {
         return;
     }
     let half = Conditions { delay: 0.4, ..nominal };
     let (tuning, closed_loop) = base("N");
     limit_holds_in_simulation("P/F N 0.4 ticks late", &closed_loop, COMBINED, |g| (tuning.scaled(g, g), half));
-    limit_holds_in_simulation("P late", &position, Law::Position, |g| (alone.scaled(g, g), late));
+    limit_holds_in_simulation("P late", &position, ControlMode::P, |g| (alone.scaled(g, g), late));
 }
 
 #[test]
@@ -314,7 +315,7 @@ fn predicted_limits_hold_behind_gauges_that_lag() {
             ClosedLoop { environment: [2.4e6, 2.4e6, 3e6, 4e3, 4e3, 1e2], measured: true, ..closed_loop.clone() };
         limit_holds_in_simulation(&at("P/F N on glass"), &on_glass, COMBINED, |g| (tuning.scaled(g, g), touching));
         let (tuning, closed_loop) = behind(base("P alone, N"));
-        limit_holds_in_simulation(&at("P"), &closed_loop, Law::Position, |g| {
+        limit_holds_in_simulation(&at("P"), &closed_loop, ControlMode::P, |g| {
             (tuning.scaled(g, g), Conditions::NOMINAL)
         });
     }

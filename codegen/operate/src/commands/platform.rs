@@ -24,13 +24,12 @@ use super::pose::{ZERO, in_words, unit};
 use specgen_language::outcome::Outcome;
 use specgen_language::table::{left, right, row};
 use specgen_language::ui::Ui;
+use specgen_runtime::ControlMode;
 
 /// Gains of each kind, in the order of the settings; those of P alone have the prefix `position_`.
 const GAINS: [&str; 3] = ["kp", "ki", "kv"];
 /// Why a frame has no such pose.
 const BEYOND: &str = "rotation exceeds the 15 deg limit for frames";
-/// Modes by the word `mode`.
-const MODES: [&str; 7] = ["p", "f-invhys", "f-ewma", "f-pcc", "pf-invhys", "pf-ewma", "pf-pcc"];
 
 /// The frame of poses in this session: µm and µrad.
 #[derive(Serialize)]
@@ -247,7 +246,7 @@ impl<P: Port> Operator<P> {
             }
             Command::Play { name, correction } => self.play(name, correction.as_ref(), line, ui)?,
             Command::Mode(wanted) => {
-                self.set_mode(*wanted)?;
+                self.set_mode(wanted)?;
                 self.show_gains(None, line, ui)?;
             }
             Command::Gains(gains) => {
@@ -294,15 +293,19 @@ impl<P: Port> Operator<P> {
 
     fn show_gains(&mut self, gain_ratio_limit: Option<f64>, line: &str, ui: &Ui) -> Result<(), SessionError> {
         let words = self.session.config()?;
-        let mode = self.word_of(&words, "mode").and_then(|mode| MODES.get(usize::try_from(mode).ok()?).copied());
+        let mode = self.word_of(&words, "mode").and_then(|mode| ControlMode::WORDS.get(usize::try_from(mode).ok()?));
         let set = |prefix: &str| GAINS.map(|name| self.six(&words, &format!("{prefix}{name}")));
         let (gains, position_gains) = (set(""), set("position_"));
-        self.note(line, &GainsInForce { mode: mode.unwrap_or("?"), gains, position_gains, gain_ratio_limit }, ui);
+        self.note(
+            line,
+            &GainsInForce { mode: mode.map_or("?", |(name, _)| *name), gains, position_gains, gain_ratio_limit },
+            ui,
+        );
         Ok(())
     }
 
     /// Sets the mode. It needs no stability check: the compiler accepts a spec only if all modes are stable.
-    fn set_mode(&mut self, wanted: ModeRequest) -> Result<(), SessionError> {
+    fn set_mode(&mut self, wanted: &ModeRequest) -> Result<(), SessionError> {
         let mut words = self.session.config()?;
         let now = self.word_of(&words, "mode").unwrap_or_default();
         let mode = wanted.word(now).map_err(SessionError::Refused)?;

@@ -6,7 +6,7 @@ use std::time::Instant;
 use host_sim::closed_loop::{Rig, RunError, Tracking};
 use host_sim::plant::LegPlant;
 use host_sim::platform::rig::{OnBoard, PlatformRun};
-use host_sim::platform::scenario::{FREE_MODES, PLATFORM_MODES, select as select_platform};
+use host_sim::platform::scenario::{FREE_MODES, select as select_platform};
 use host_sim::platform::table::{MachiningTable, PoseRow};
 use host_sim::platform::{PlatformScenario, WorkPart};
 use host_sim::scenario::{MODES, select as select_legs};
@@ -20,6 +20,7 @@ use specgen_compiler::compile::Compilation;
 use specgen_language::model::TaskSpace;
 use specgen_language::outcome::Failure;
 use specgen_language::ui::Ui;
+use specgen_runtime::ControlMode;
 use specgen_studies::machine::PlantOptions;
 use specgen_studies::{machine, runs};
 
@@ -158,7 +159,7 @@ impl Plan {
                     .to_owned(),
             ));
         }
-        let wanted = options.mode.map(|name| mode(name, &PLATFORM_MODES)).transpose()?;
+        let wanted = options.mode.map(|name| mode(name, &ControlMode::WORDS)).transpose()?;
         if let Some(name) = options.trajectory {
             if options.frequency.is_some() {
                 return Err(Failure::Usage(
@@ -183,7 +184,7 @@ impl Plan {
         };
         let usual = match part {
             None => FREE_MODES.to_vec(),
-            Some(_) => vec![PLATFORM_MODES[0], PLATFORM_MODES[3], PLATFORM_MODES[6]],
+            Some(_) => vec![ControlMode::WORDS[0], ControlMode::WORDS[3], ControlMode::WORDS[6]],
         };
         let frequency = options.frequency.unwrap_or(if part.is_some() { MACHINING_FREQUENCY } else { FREQUENCY });
         Ok(Self::Path { name, path, part, modes: wanted.map_or(usual, |mode| vec![mode]), frequency })

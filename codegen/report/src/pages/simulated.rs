@@ -12,7 +12,6 @@ use host_sim::plant::LegParameters;
 use host_sim::platform::rig::Noise;
 use host_sim::scenario::{MODES, select};
 use specgen_compiler::compile::Compilation;
-use specgen_compiler::stability::platform::Law;
 use specgen_language::diagnostic::codes;
 use specgen_language::model::TaskSpace;
 use specgen_language::shell;
@@ -23,6 +22,7 @@ use super::SEED;
 use specgen_compiler::lower;
 use specgen_language::outcome::{Failure, environment};
 use specgen_language::ui::Ui;
+use specgen_runtime::ControlMode;
 use specgen_studies::{machine, reproduce};
 
 /// Frequencies for six legs, Hz; the first is that of the budget.
@@ -65,7 +65,7 @@ fn of_platform(
     let all =
         tracking::follow(compiled, task, &scenario, controller, &|what| ui.progress(what)).map_err(run_failure)?;
     let mode = tracking::mode_of(controller);
-    let law = margins::name(Law::ALL.get(mode as usize).copied().unwrap_or(Law::Position));
+    let law = margins::name(ControlMode::from_word(u64::from(mode)).unwrap_or(ControlMode::P));
     let corners = compiled.findings.iter().any(|finding| finding.code == codes::TRAJECTORY_CORNERS.id);
     let mut sections =
         vec![tracking::section(&all, &law, model.timing.period, corners, &shell::on("specgen sim", name, "-o DIR"))];

@@ -4,11 +4,10 @@ use host_sim::closed_loop::RunError;
 use host_sim::controller::{Controller, TickController};
 use host_sim::platform::PlatformScenario;
 use host_sim::platform::rig::{Record, RunOptions};
-use host_sim::platform::scenario::PLATFORM_MODES;
 use host_sim::scenario::{LINEARITY_FREQUENCIES, LegScenario, MODES, select};
 use host_sim::table::Line;
 use host_sim::trajectory::{PaperPath, PaperPose, Reading};
-use specgen_runtime::Platform;
+use specgen_runtime::{ControlMode, Platform};
 
 use super::motion::REFUSED_PATH;
 use crate::chart::{Axis, Chart, LINE, pairs};
@@ -73,7 +72,7 @@ pub fn of_platform(
         "Linear fit for each leg, Y = λ q̂ + δ",
         &["leg", "Hz", "λ = ρ/ρ̂", "δ, nm", "deviation from the line, nm rms"],
     );
-    select(controller, PLATFORM_MODES[1].1)?;
+    select(controller, ControlMode::WORDS[1].1)?;
     for frequency in PLATFORM_FREQUENCIES {
         let trajectory = PaperPose { path: PaperPath::Case1, reading: Reading::Corrected, frequency };
         let run = traced.run(controller, &trajectory)?;

@@ -11,7 +11,7 @@ use host_sim::closed_loop::RunError;
 use host_sim::controller::TickController;
 use host_sim::coverage::Coverage;
 use host_sim::platform::rig::{PlatformRun, Record};
-use host_sim::platform::scenario::{FREE_MODES, PLATFORM_MODES, select};
+use host_sim::platform::scenario::{FREE_MODES, select};
 use host_sim::platform::table::{AXES, MachiningRow, MachiningTable, PoseRow, PoseTable};
 use host_sim::platform::{PlatformScenario, WorkPart};
 use host_sim::trajectory::{PaperPath, PaperPose, PoseTarget, PoseTrajectory, Reading};
@@ -22,10 +22,12 @@ use super::{Options, record, write_files};
 use crate::chart::{Axis, Chart, LINE};
 use crate::drawing::{self, File};
 use specgen_compiler::compile::Compilation;
-use specgen_language::model::{AdaptationMode, ControlMode, TaskSpace};
+use specgen_compiler::stability::platform::start_mode;
+use specgen_language::model::TaskSpace;
 use specgen_language::outcome::{Failure, Outcome, environment};
 use specgen_language::table::{left, right, row};
 use specgen_language::ui::Ui;
+use specgen_runtime::ControlMode;
 use specgen_studies::machine::{self, run_failure};
 use specgen_studies::runs::{LEG_LIMITED, TrajectoryErrors, selector};
 
@@ -39,7 +41,7 @@ const WAVE: f64 = 0.9;
 /// The paper's free motions.
 const CASES: [(&str, PaperPath); 2] = [("case-1", PaperPath::Case1), ("case-2", PaperPath::Case2)];
 /// P, F and P/F of Table 9.
-const MACHINING: [(&str, u32); 3] = [PLATFORM_MODES[0], PLATFORM_MODES[3], PLATFORM_MODES[6]];
+const MACHINING: [(&str, u32); 3] = [ControlMode::WORDS[0], ControlMode::WORDS[3], ControlMode::WORDS[6]];
 /// Frequency of the machining path, Hz.
 const MACHINING_FREQUENCY: f64 = 1.0;
 /// Refuses options for legs only, and a trajectory that the spec does not have.
@@ -100,7 +102,7 @@ pub(super) fn run(
     let plot = options.plot.charts(&compiled.ir.name, "target minus true pose", &charts)?;
     let report = Report {
         name: &compiled.ir.name,
-        mode: mode_name(task, compiled.model.adaptation.mode),
+        mode: start_mode(&compiled.model, task).to_string(),
         plot,
         digest: &compiled.ir.digest,
         seed,
@@ -229,20 +231,6 @@ fn table(motions: &[Motion]) -> String {
 /// At most seven characters up to a metre.
 fn short(nano: f64) -> String {
     if nano < 999.0 { format!("{nano:.2}") } else { format!("{nano:.0}") }
-}
-
-/// Name of the spec's mode, such as `P/F pcc`.
-fn mode_name(task: &TaskSpace, adaptation: AdaptationMode) -> String {
-    let adaptation = match adaptation {
-        AdaptationMode::Invhys => "invhys",
-        AdaptationMode::Ewma => "ewma",
-        AdaptationMode::Pcc => "pcc",
-    };
-    match task.mode {
-        ControlMode::P => "P".to_owned(),
-        ControlMode::F => format!("F {adaptation}"),
-        ControlMode::PF => format!("P/F {adaptation}"),
-    }
 }
 
 /// The platform at its zero pose.

@@ -7,9 +7,9 @@ use serde::Serialize;
 use super::Job;
 use super::start::Starts;
 use specgen_compiler::compile::Compilation;
-use specgen_compiler::stability::platform::{Conditions, Estimator, Law, ModeMargins};
+use specgen_compiler::stability::platform::{Conditions, ModeMargins};
 use specgen_compiler::stability::{LegDynamics, phase_margin, transition};
-use specgen_language::model::{AdaptationMode, ControlMode};
+use specgen_language::model::AdaptationMode;
 use specgen_language::outcome::{Failure, Outcome};
 use specgen_language::table::{left, right, row};
 use specgen_studies::machine::run_failure;
@@ -245,21 +245,11 @@ impl Outcome for Report<'_> {
 /// Margins in the spec's own mode.
 fn margins_of(job: &Job, tuned: &Compilation) -> Margins {
     let model = &tuned.model;
-    let adapting = match model.adaptation.mode {
-        AdaptationMode::Invhys => Estimator::Invhys,
-        AdaptationMode::Ewma => Estimator::Ewma,
-        AdaptationMode::Pcc => Estimator::Pcc,
-    };
     let degrees = |phase: Option<f64>| phase.map(f64::to_degrees);
     if let (Some(task), Some(design), Feasibility::Platform { closed_loop, .. }) =
         (&model.task_space, &tuned.design, &job.feasibility)
     {
-        let law = match task.mode {
-            ControlMode::P => Law::Position,
-            ControlMode::F => Law::Feedforward(adapting),
-            ControlMode::PF => Law::Combined(adapting),
-        };
-        let tuning = if law == Law::Position { &design.position } else { &design.combined };
+        let (law, tuning) = design.law(model, task);
         let phase = phase_margin(|gain_ratio| {
             closed_loop.transition(law, tuning, &Conditions { gain_ratio, ..Conditions::NOMINAL })
         });

@@ -5,8 +5,8 @@ use std::f64::consts::TAU;
 use serde::Serialize;
 use specgen_compiler::compile::Compilation;
 use specgen_compiler::lower;
-use specgen_compiler::stability::platform::{ClosedLoop, Conditions, Estimator, Law, RestDynamics, Tuning};
-use specgen_language::model::{AdaptationMode, ControlMode};
+use specgen_compiler::stability::platform::{ClosedLoop, Conditions, RestDynamics, Tuning};
+use specgen_runtime::{ControlMode, Law};
 
 use super::matrix::{Matrix6c, inverse, larger, left, multiply, norm, spectral_radius};
 use super::response::{Bin, Response};
@@ -36,7 +36,7 @@ const STIFFNESSES: u32 = 5;
 /// A loop for which learning is possible.
 pub struct Learnable {
     pub(super) closed_loop: ClosedLoop,
-    law: Law,
+    law: ControlMode,
     tuning: Tuning,
     /// τ, s.
     pub(super) lead: f64,
@@ -144,17 +144,8 @@ impl Learnable {
         let (model, task) = (&compiled.model, compiled.model.task_space.as_ref()?);
         let design = compiled.design.as_ref()?;
         let closed_loop = design.closed_loop(model, task, &RestDynamics::of(&lower::platform(model).ok()?))?;
-        let adapting = match model.adaptation.mode {
-            AdaptationMode::Invhys => Estimator::Invhys,
-            AdaptationMode::Ewma => Estimator::Ewma,
-            AdaptationMode::Pcc => Estimator::Pcc,
-        };
-        let (law, tuning) = match task.mode {
-            ControlMode::P => (Law::Position, design.position),
-            ControlMode::F => (Law::Feedforward(adapting), design.combined),
-            ControlMode::PF => (Law::Combined(adapting), design.combined),
-        };
-        Some(Self { closed_loop, law, tuning, lead: design.lead, measured: None })
+        let (law, tuning) = design.law(model, task);
+        Some(Self { closed_loop, law, tuning: *tuning, lead: design.lead, measured: None })
     }
 
     pub(crate) fn closed_loop(&self) -> &ClosedLoop {
@@ -162,7 +153,7 @@ impl Learnable {
     }
 
     /// The initial control mode and its gains.
-    pub(crate) fn law(&self) -> (Law, &Tuning) {
+    pub(crate) fn law(&self) -> (ControlMode, &Tuning) {
         (self.law, &self.tuning)
     }
 
@@ -191,7 +182,7 @@ impl Learnable {
 
     /// G: the response without feedback.
     pub(super) fn open_loop(&self, frequencies: &[f64]) -> Vec<Matrix6c> {
-        let law = Law::Feedforward(Estimator::Invhys);
+        let law = ControlMode::F(Law::Invhys);
         let open = Self { closed_loop: self.closed_loop.clone(), law, tuning: Tuning::NONE, lead: 0.0, measured: None };
         open.nominal(frequencies)
     }

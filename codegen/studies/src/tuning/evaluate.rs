@@ -27,7 +27,7 @@ use super::Setting;
 use super::space::axis_stiffness;
 use crate::machine;
 use specgen_compiler::compile::Compilation;
-use specgen_compiler::stability::platform::Tuning;
+use specgen_compiler::stability::platform::{Tuning, start_mode};
 use specgen_language::model::{Model, TaskSpace};
 
 /// a1 and a2 of (9), Table 3.
@@ -239,7 +239,7 @@ impl Case {
         armed.configure(&start.words(&armed))?;
         let study = PlatformStudy::new(&scenario, &armed, trajectory.as_ref(), conditions.whole_ticks)?;
         let stiffness = axis_stiffness(model);
-        let alone = task.mode == specgen_language::model::ControlMode::P;
+        let alone = start_mode(model, task).capabilities().own_gains;
         Ok(Self {
             kind: Kind::Platform { study, radius: model.geometry.joint_radius(), stiffness, alone },
             period: model.timing.period,

@@ -3,10 +3,11 @@
 use specgen_compiler::compile::Compilation;
 use specgen_compiler::lower::platform;
 use specgen_compiler::stability::platform::{
-    ClosedLoop, Conditions, Estimator, LARGEST_RADIUS, Law, RestDynamics, Tuning,
+    ClosedLoop, Conditions, LARGEST_RADIUS, LoopKind, RestDynamics, Tuning, start_mode,
 };
 use specgen_compiler::stability::{LegDynamics, ewma_limit, pcc_limit, spectral_radius};
-use specgen_language::model::{Adaptation, AdaptationMode, ControlMode};
+use specgen_language::model::{Adaptation, AdaptationMode};
+use specgen_runtime::ControlMode;
 
 use super::Setting;
 
@@ -40,8 +41,8 @@ pub enum Feasibility {
         /// The closed loop without the tuned settings.
         closed_loop: Box<ClosedLoop>,
         /// Control modes that use the tuned parameters.
-        laws: Vec<Law>,
-        /// Limits of λ.
+        laws: Vec<ControlMode>,
+        /// λ.
         ratios: [f64; 2],
         /// The required margins.
         required: RequiredMargins,
@@ -61,24 +62,12 @@ impl Feasibility {
         let Some(closed_loop) = rest.ok().and_then(|rest| design?.closed_loop(model, task, &rest)) else {
             return legs();
         };
-        // A running controller may be switched to any of them; the spec's own is checked first.
-        let adapting = match model.adaptation.mode {
-            AdaptationMode::Invhys => Estimator::Invhys,
-            AdaptationMode::Ewma => Estimator::Ewma,
-            AdaptationMode::Pcc => Estimator::Pcc,
-        };
-        let mut laws = match task.mode {
-            ControlMode::P => vec![Law::Position],
-            ControlMode::F => vec![Law::Feedforward(adapting)],
-            ControlMode::PF => vec![Law::Combined(adapting)],
-        };
-        if task.mode != ControlMode::P {
-            for law in Law::ALL {
-                let used = law != Law::Position && law != Law::Feedforward(Estimator::Invhys);
-                if used && !laws.contains(&law) {
-                    laws.push(law);
-                }
-            }
+        // A running controller may be switched to any of them; the one of the spec is asked first.
+        let own = start_mode(model, task);
+        let mut laws = vec![own];
+        if !own.capabilities().own_gains {
+            let others = [LoopKind::Estimates, LoopKind::Combined].into_iter().flat_map(LoopKind::modes);
+            laws.extend(others.filter(|law| *law != own));
         }
         Self::Platform { closed_loop: Box::new(closed_loop), laws, ratios: model.adaptation.gain_ratio, required }
     }
@@ -90,13 +79,12 @@ impl Feasibility {
             (Self::Legs { dynamics, adaptation, required }, Setting::Legs { level, drift }) => {
                 leg_holds(dynamics, adaptation, required, *level, *drift)
             }
-            (
-                Self::Platform { closed_loop, laws, ratios, required },
-                Setting::Platform { combined, position, period },
-            ) => laws.iter().all(|law| {
-                let tuning = if *law == Law::Position { position } else { combined };
-                platform_holds(closed_loop, *law, tuning, *ratios, required, *period)
-            }),
+            (Self::Platform { closed_loop, laws, ratios, required }, Setting::Platform { period, .. }) => {
+                laws.iter().all(|law| {
+                    let tuning = setting.tuning(law.capabilities().own_gains);
+                    platform_holds(closed_loop, *law, &tuning, *ratios, required, *period)
+                })
+            }
             _ => false,
         }
     }
@@ -131,7 +119,7 @@ fn leg_holds(
 
 fn platform_holds(
     closed_loop: &ClosedLoop,
-    law: Law,
+    law: ControlMode,
     tuning: &Tuning,
     [low, high]: [f64; 2],
     required: &RequiredMargins,

@@ -11,9 +11,10 @@ use serde::Serialize;
 use super::Setting;
 use specgen_compiler::compile::Compilation;
 use specgen_compiler::lower::platform;
-use specgen_compiler::stability::platform::RestDynamics;
+use specgen_compiler::stability::platform::{RestDynamics, start_law, start_mode};
 use specgen_language::diagnostic::{Diagnostic, codes};
-use specgen_language::model::{AdaptationMode, ControlMode, Model};
+use specgen_language::model::Model;
+use specgen_runtime::{ControlMode, Law};
 
 /// Which parameters to tune.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -117,15 +118,16 @@ impl Space {
     /// If the spec's mode uses none of these parameters, or bounds are empty or for a parameter that is not tuned.
     pub fn of(compiled: &Compilation, what: TunedNumbers, given: &[GivenBounds]) -> Result<Self, Vec<Diagnostic>> {
         let model = &compiled.model;
-        let mode = model.task_space.as_ref().map(|task| task.mode);
+        let mode = model.task_space.as_ref().map(|task| start_mode(model, task));
         let base = Setting::of(compiled);
         let mut parameters = Vec::new();
         let mut add = |role: Role, bounds: [f64; 2]| parameters.push(Parameter { role, bounds });
         let mut stiffness = [1.0; 6];
-        let alone = mode == Some(ControlMode::P);
+        let has = mode.map(ControlMode::capabilities);
+        let alone = has.is_some_and(|has| has.own_gains);
         if let Some(design) = &compiled.design {
             stiffness = axis_stiffness(model);
-            if what != TunedNumbers::Weights && mode != Some(ControlMode::F) {
+            if what != TunedNumbers::Weights && has.is_some_and(|has| has.feeds_back) {
                 let damped = if alone { design.position } else { design.combined }.derivative != [0.0; 6];
                 (0..6).for_each(|axis| add(Role::Proportional(axis), PROPORTIONAL));
                 (0..6).for_each(|axis| add(Role::Integral(axis), INTEGRAL));
@@ -134,16 +136,17 @@ impl Space {
                 }
             }
         }
-        if what != TunedNumbers::Gains && !alone {
+        if what != TunedNumbers::Gains {
             let bandwidths = compiled.design.as_ref().map(|design| {
                 let most = design.bandwidth_limit;
                 [[0.01 * most, most], [1e-4 * most, 0.5 * most]]
             });
             let [level, drift] = bandwidths.unwrap_or(WEIGHTS);
-            if model.adaptation.mode != AdaptationMode::Invhys {
+            let law = mode.map_or_else(|| start_law(model), ControlMode::law);
+            if law != Law::Invhys {
                 add(Role::Level, level);
             }
-            if model.adaptation.mode == AdaptationMode::Pcc {
+            if law == Law::Pcc {
                 add(Role::Drift, drift);
             }
         }

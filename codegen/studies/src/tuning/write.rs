@@ -6,7 +6,7 @@ use toml_edit::{Array, DocumentMut, Item, Table, Value};
 use super::Setting;
 use super::space::{Role, Space};
 use specgen_compiler::compile::Compilation;
-use specgen_language::model::ControlMode;
+use specgen_compiler::stability::platform::{LoopKind, start_mode};
 
 /// Units of gains along and about an axis.
 const UNITS: [(&str, [&str; 2]); 3] = [
@@ -55,7 +55,7 @@ pub fn edited(compiled: &Compilation, space: &Space, setting: &Setting, note: &s
                 .model
                 .task_space
                 .as_ref()
-                .filter(|task| task.mode == ControlMode::PF)
+                .filter(|task| LoopKind::of(start_mode(&compiled.model, task)) == LoopKind::Combined)
                 .map_or((true, true), |task| (task.gains.is_some(), task.adaptation.is_some()));
             if !gains_given || tunes(|role| matches!(role, Role::Proportional(_) | Role::Integral(_))) {
                 let (name, gains) = if space.alone { ("position_gains", position) } else { ("gains", combined) };

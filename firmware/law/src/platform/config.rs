@@ -55,25 +55,19 @@ pub struct Settings<P: Platform> {
 }
 
 impl<P: Platform> Settings<P> {
-    /// Gains of (7) in the present mode: in P, those of P alone.
+    /// Gains of (7) in the present mode.
     #[inline]
     #[must_use]
     pub const fn active_gains(&self) -> &Gains<P::Real> {
-        match self.mode {
-            ControlMode::P => &self.position_gains,
-            _ => &self.gains,
-        }
+        if self.mode.capabilities().own_gains { &self.position_gains } else { &self.gains }
     }
 
     /// Whether any k_v of the present mode is non-zero.
     #[inline]
     #[must_use]
     pub const fn damps(&self) -> bool {
-        match self.mode {
-            ControlMode::P => self.damps[1],
-            ControlMode::F(_) => false,
-            ControlMode::PF(_) => self.damps[0],
-        }
+        let mode = self.mode.capabilities();
+        if mode.own_gains { self.damps[1] } else { mode.feeds_back && self.damps[0] }
     }
 }
 

@@ -6,7 +6,7 @@ use host_sim::plant::LegParameters;
 use host_sim::platform::PlatformParameters;
 use host_sim::platform::rig::{GaugeFault, Record};
 use host_sim::platform::rig::{Noise, RunOptions};
-use host_sim::platform::scenario::{FREE_MODES, MACHINING_MODES, NamedTrajectory, PLATFORM_MODES, select};
+use host_sim::platform::scenario::{FREE_MODES, MACHINING_MODES, NamedTrajectory, select};
 use host_sim::platform::{PlatformScenario, Specimen, WorkPart};
 use host_sim::trajectory::{PaperPath, PaperPose, PoseTarget, PoseTrajectory};
 use oracle::design::{Deviation, Gains, Rule};
@@ -147,7 +147,7 @@ fn the_linear_limit_divides_settling_from_ringing() {
             let mut scenario = scenario(&specimen, &settings, &Noise::NONE);
             scenario.options.record = Record::Samples;
             let mut controller = PlatformOracle::new(&settings).unwrap();
-            select(&mut controller, PLATFORM_MODES[2].1).unwrap();
+            select(&mut controller, 2).unwrap();
             let samples = scenario.run(&mut controller, &Nudge).unwrap().samples;
             samples[5000..].iter().map(|s| (s.tick.pose[0] - s.target[0]).abs()).reduce(worse).unwrap()
         };

@@ -13,11 +13,12 @@
 
 mod driven;
 
-use super::law::{Estimator, Law, Tuning};
+use super::law::Tuning;
 use super::modes::ModalBasis;
 use super::notch::{Biquad, Notch};
 use super::sampled::{PLACE, Plant, shown, states};
 use specgen_numerics::{Matrix, Matrix6, spectral_radius};
+use specgen_runtime::{ControlMode, Law};
 
 /// A linear combination of the states.
 type Signal = Vec<f64>;
@@ -70,14 +71,14 @@ pub struct ClosedLoop {
 impl ClosedLoop {
     /// Largest magnitude of an eigenvalue of one tick; infinite if it cannot be found.
     #[must_use]
-    pub fn spectral_radius(&self, law: Law, tuning: &Tuning, conditions: &Conditions) -> f64 {
+    pub fn spectral_radius(&self, law: ControlMode, tuning: &Tuning, conditions: &Conditions) -> f64 {
         spectral_radius(&self.transition(law, tuning, conditions))
     }
 
     /// The matrix of one tick. States that the law or the tuning does not use are left out: an idle integrator would give an
     /// eigenvalue of 1.
     #[must_use]
-    pub fn transition(&self, law: Law, tuning: &Tuning, conditions: &Conditions) -> Matrix {
+    pub fn transition(&self, law: ControlMode, tuning: &Tuning, conditions: &Conditions) -> Matrix {
         Assembly::new(self, law, tuning, conditions).matrix()
     }
 
@@ -144,10 +145,10 @@ struct Assembly<'a> {
 }
 
 impl<'a> Assembly<'a> {
-    fn new(of: &'a ClosedLoop, law: Law, tuning: &'a Tuning, conditions: &'a Conditions) -> Self {
-        let feeds_back = law.feeds_back();
-        let adapts = law.adapting() != Estimator::Invhys && tuning.level_bandwidth != 0.0;
-        let drifts = adapts && law.adapting() == Estimator::Pcc && tuning.drift_bandwidth != 0.0;
+    fn new(of: &'a ClosedLoop, law: ControlMode, tuning: &'a Tuning, conditions: &'a Conditions) -> Self {
+        let feeds_back = law.capabilities().feeds_back;
+        let adapts = law.law() != Law::Invhys && tuning.level_bandwidth != 0.0;
+        let drifts = adapts && law.law() == Law::Pcc && tuning.drift_bandwidth != 0.0;
         let integrating = if feeds_back { used(&tuning.integral) } else { Vec::new() };
         let damped = if feeds_back { used(&tuning.derivative) } else { Vec::new() };
         let notch = |wanted: bool| if wanted && of.notch.is_some() { 12 } else { 0 };
@@ -159,7 +160,7 @@ impl<'a> Assembly<'a> {
         let history = take(6 * libm::ceil(conditions.delay) as usize);
         let error_notch = take(notch(feeds_back));
         let innovation_notch = take(notch(adapts));
-        let active_damping = take(if of.active_damping.is_some() && law.damps_modes() { 12 } else { 0 });
+        let active_damping = take(if of.active_damping.is_some() && law.capabilities().damps_modes { 12 } else { 0 });
         let last_feedback = take(if feeds_back && adapts { 6 } else { 0 });
         let integral = take(integrating.len());
         let level = take(if adapts { 6 } else { 0 });
@@ -185,7 +186,7 @@ impl<'a> Assembly<'a> {
             tuning,
             conditions,
             feeds_back,
-            damps_modes: law.damps_modes(),
+            damps_modes: law.capabilities().damps_modes,
             adapts,
             drifts,
             integrating,

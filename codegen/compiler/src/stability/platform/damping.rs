@@ -16,11 +16,12 @@ use core::f64::consts::PI;
 use serde::Serialize;
 
 use super::closed_loop::{ClosedLoop, Conditions};
-use super::law::{Estimator, Tuning};
+use super::law::Tuning;
 use super::notch::{Biquad, in_reach};
 use super::sampled::{PLACE, Plant, shown};
 use specgen_numerics::nyquist::{Complex, over, plus, sensitivity, square, times};
 use specgen_numerics::{Matrix6, simplex};
+use specgen_runtime::Law;
 
 /// Number of frequencies below, around and above the mode.
 const POINTS: [u32; 3] = [50, 100, 40];
@@ -80,13 +81,13 @@ struct Feedback {
 }
 
 /// The sections, and gains and bandwidths that replace the rule's `start`.
-pub(super) fn design(of: &ClosedLoop, adapting: Estimator, start: &Tuning) -> (ActiveDamping, Tuning) {
+pub(super) fn design(of: &ClosedLoop, adapting: Law, start: &Tuning) -> (ActiveDamping, Tuning) {
     let share = shares(of, start);
     let feedback = |mode: usize, factors: [f64; 4]| Feedback {
         gains: [share[mode][0] * factors[0], share[mode][1] * of.period * factors[1]],
         weights: [
             start.level_bandwidth * of.period * factors[2],
-            if adapting == Estimator::Pcc { start.drift_bandwidth * of.period * factors[3] } else { 0.0 },
+            if adapting == Law::Pcc { start.drift_bandwidth * of.period * factors[3] } else { 0.0 },
         ],
     };
     // Factors of k_p, k_I, Ω1 and Ω2.
@@ -190,7 +191,7 @@ fn search(count: usize, known: Option<&[f64]>, mut cost: impl FnMut(&[f64]) -> f
 /// A mode under all its design conditions.
 struct Family<'a> {
     of: &'a ClosedLoop,
-    adapting: Estimator,
+    adapting: Law,
     frequency: f64,
     damping: f64,
     /// z⁻¹, N and s/ω of the bilinear map at each frequency.
@@ -247,7 +248,7 @@ impl Figures {
 }
 
 impl<'a> Family<'a> {
-    fn of(of: &'a ClosedLoop, mode: usize, adapting: Estimator) -> Self {
+    fn of(of: &'a ClosedLoop, mode: usize, adapting: Law) -> Self {
         let (frequency, period) = (of.basis.frequencies[mode], of.period);
         let slow = SLOW.map(|share| of.basis.frequencies[0] / share);
         let angles = angles(frequency * period, slow.map(|one| one * period));
@@ -323,7 +324,7 @@ impl<'a> Family<'a> {
     fn controller(&self, feedback: &Feedback, section: Option<&[f64]>) -> Controller {
         let [proportional, integral] = feedback.gains;
         let [level, drift] = feedback.weights;
-        let adapts = self.adapting != Estimator::Invhys && level > 0.0;
+        let adapts = self.adapting != Law::Invhys && level > 0.0;
         let integrates = integral > 0.0;
         let drifts = adapts && drift > 0.0;
         let scaled = |factor: f64, value: Complex| [factor * value[0], factor * value[1]];

@@ -1,77 +1,59 @@
-//! The control modes of a platform controller and their numbers.
+//! The control mode of a spec, the loop that a mode closes, and its numbers.
 
-use serde::{Serialize, Serializer};
+use serde::Serialize;
+use specgen_language::model::{self, AdaptationMode, Model, TaskSpace};
+use specgen_runtime::{ControlMode, Law};
 
-/// The estimates of F in use.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Estimator {
-    /// None: inverse Preisach model alone.
-    Invhys,
-    /// δ̂.
-    Ewma,
-    /// δ̂ and φ̂.
-    Pcc,
+/// The mode that a spec starts with.
+#[must_use]
+pub fn start_mode(model: &Model, task: &TaskSpace) -> ControlMode {
+    match task.mode {
+        model::ControlMode::P => ControlMode::P,
+        model::ControlMode::F => ControlMode::F(start_law(model)),
+        model::ControlMode::PF => ControlMode::PF(start_law(model)),
+    }
 }
 
-/// A control mode: what a running controller can be switched to.
+/// The run-to-run law that a spec starts with.
+#[must_use]
+pub fn start_law(model: &Model) -> Law {
+    match model.adaptation.mode {
+        AdaptationMode::Invhys => Law::Invhys,
+        AdaptationMode::Ewma => Law::Ewma,
+        AdaptationMode::Pcc => Law::Pcc,
+    }
+}
+
+/// The loop that a control mode closes: the modes of a kind are stable, or not, by the same numbers of a spec.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Law {
-    /// P alone.
+pub enum LoopKind {
+    /// Nothing is fed back.
+    Open,
+    /// The estimates alone, by their bandwidths.
+    Estimates,
+    /// The pose error, by `gains`, and the estimates of a law that has any.
+    Combined,
+    /// The pose error, by `position_gains`.
     Position,
-    /// F alone.
-    Feedforward(Estimator),
-    /// P/F.
-    Combined(Estimator),
 }
 
-impl Law {
-    /// Every mode, in the order of the word `mode`.
-    pub const ALL: [Self; 7] = [
-        Self::Position,
-        Self::Feedforward(Estimator::Invhys),
-        Self::Feedforward(Estimator::Ewma),
-        Self::Feedforward(Estimator::Pcc),
-        Self::Combined(Estimator::Invhys),
-        Self::Combined(Estimator::Ewma),
-        Self::Combined(Estimator::Pcc),
-    ];
-
-    /// Its name for users.
+impl LoopKind {
+    /// That of a mode.
     #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Position => "P",
-            Self::Feedforward(Estimator::Invhys) => "F invhys",
-            Self::Feedforward(Estimator::Ewma) => "F ewma",
-            Self::Feedforward(Estimator::Pcc) => "F pcc",
-            Self::Combined(Estimator::Invhys) => "P/F invhys",
-            Self::Combined(Estimator::Ewma) => "P/F ewma",
-            Self::Combined(Estimator::Pcc) => "P/F pcc",
+    pub fn of(mode: ControlMode) -> Self {
+        let capabilities = mode.capabilities();
+        match (capabilities.feeds_back, capabilities.own_gains) {
+            (true, true) => Self::Position,
+            (true, false) => Self::Combined,
+            (false, _) if mode.law() != Law::Invhys => Self::Estimates,
+            (false, _) => Self::Open,
         }
     }
 
-    /// Whether the pose error is fed back.
-    pub(super) fn feeds_back(self) -> bool {
-        !matches!(self, Self::Feedforward(_))
-    }
-
-    /// Whether active damping acts.
-    pub(super) fn damps_modes(self) -> bool {
-        matches!(self, Self::Combined(_))
-    }
-
-    /// The estimates in use.
-    pub(super) fn adapting(self) -> Estimator {
-        match self {
-            Self::Position => Estimator::Invhys,
-            Self::Feedforward(adapting) | Self::Combined(adapting) => adapting,
-        }
-    }
-}
-
-impl Serialize for Law {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.serialize_str(self.name())
+    /// The modes that close it.
+    #[must_use]
+    pub fn modes(self) -> Vec<ControlMode> {
+        ControlMode::all().filter(|mode| Self::of(*mode) == self).collect()
     }
 }
 

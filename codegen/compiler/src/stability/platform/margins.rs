@@ -2,14 +2,15 @@
 
 use core::f64::consts::{PI, TAU};
 
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 
 use super::closed_loop::{ClosedLoop, Conditions};
-use super::law::{Law, Tuning};
+use super::law::{LoopKind, Tuning};
 use super::rule::is_stable;
 use super::search::largest_stable;
 use super::{nominal_conditions, worst_radius};
 use specgen_numerics::eigenvalues;
+use specgen_runtime::ControlMode;
 
 /// Upper ends of the search for margins.
 const LARGEST_RATIO: f64 = 10.0;
@@ -22,7 +23,8 @@ const WELL_DAMPED: f64 = 0.5;
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ModeMargins {
     /// The control mode, such as `P/F pcc`.
-    pub law: Law,
+    #[serde(serialize_with = "by_name")]
+    pub law: ControlMode,
     /// Largest spectral radius over gain_ratio, free and touching the declared work piece.
     pub spectral_radius: f64,
     /// λ = ρ/ρ̂ up to which the loop is stable; none: beyond 10.
@@ -49,7 +51,7 @@ pub struct ClosedMode {
 }
 
 impl ModeMargins {
-    pub(super) fn of(closed_loop: &ClosedLoop, law: Law, tuning: &Tuning, ratios: [f64; 2]) -> Self {
+    pub(super) fn of(closed_loop: &ClosedLoop, law: ControlMode, tuning: &Tuning, ratios: [f64; 2]) -> Self {
         let stable = |tuning: &Tuning, conditions: &Conditions| is_stable(closed_loop, law, tuning, conditions);
         let contacts = [false, true];
         let contacts = if closed_loop.environment == [0.0; 6] { &contacts[..1] } else { &contacts[..] };
@@ -99,8 +101,12 @@ impl ModeMargins {
     }
 }
 
+fn by_name<S: Serializer>(mode: &ControlMode, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_str(mode)
+}
+
 /// Slowest time constant and weakly damped modes of the nominal loop.
-fn closed_modes(closed_loop: &ClosedLoop, law: Law, tuning: &Tuning) -> (Option<f64>, Vec<ClosedMode>) {
+fn closed_modes(closed_loop: &ClosedLoop, law: ControlMode, tuning: &Tuning) -> (Option<f64>, Vec<ClosedMode>) {
     let values = eigenvalues(&closed_loop.transition(law, tuning, &Conditions::NOMINAL)).unwrap_or_default();
     let mut slowest = 0.0;
     let mut modes = Vec::new();
@@ -120,6 +126,6 @@ fn closed_modes(closed_loop: &ClosedLoop, law: Law, tuning: &Tuning) -> (Option<
         }
     }
     modes.sort_by(|a, b| a.frequency.total_cmp(&b.frequency).then(a.damping_ratio.total_cmp(&b.damping_ratio)));
-    let closed = law != Law::Feedforward(super::law::Estimator::Invhys) && slowest > 0.0;
+    let closed = LoopKind::of(law) != LoopKind::Open && slowest > 0.0;
     (closed.then_some(slowest), modes)
 }

@@ -3,15 +3,16 @@
 use core::f64::consts::TAU;
 
 use super::closed_loop::{ClosedLoop, Conditions};
-use super::law::{Law, Tuning};
+use super::law::Tuning;
 use super::sampled::Plant;
 use specgen_numerics::nyquist::Complex;
+use specgen_runtime::ControlMode;
 
 impl ClosedLoop {
     /// The open loop of each axis x to θz at `frequencies` (Hz, below half the tick rate), with the other axes open as well: gain
     /// (a ratio) and phase (degrees, unwrapped from that of the lowest frequency). With λ = 1, free of contact.
     #[must_use]
-    pub fn open_loop(&self, law: Law, tuning: &Tuning, frequencies: &[f64]) -> [Vec<[f64; 2]>; 6] {
+    pub fn open_loop(&self, law: ControlMode, tuning: &Tuning, frequencies: &[f64]) -> [Vec<[f64; 2]>; 6] {
         let at = |gain_ratio| self.transition(law, tuning, &Conditions { gain_ratio, ..Conditions::NOMINAL });
         // λ multiplies only the effect of the request on the plant, so the difference is the loop's return path.
         let (open, closed) = (at(0.0), at(1.0));

@@ -4,16 +4,14 @@ use core::f64::consts::{PI, TAU};
 
 use super::closed_loop::{ClosedLoop, Conditions};
 use super::damping::ActiveDamping;
-use super::law::{Estimator, Law, Tuning};
+use super::law::{LoopKind, Tuning, start_mode};
 use super::margins::ModeMargins;
 use super::search::largest_stable;
 use super::{LARGEST_RADIUS, nominal_conditions, notch, worst_radius};
 use specgen_language::diagnostic::{Diagnostic, codes};
-use specgen_language::model::{AdaptationMode, ControlMode, Model, TaskSpace};
+use specgen_language::model::{Model, TaskSpace};
+use specgen_runtime::{ControlMode, Law};
 
-const ADAPTED: [Law; 2] = [Law::Feedforward(Estimator::Ewma), Law::Feedforward(Estimator::Pcc)];
-const COMBINED: [Law; 3] =
-    [Law::Combined(Estimator::Invhys), Law::Combined(Estimator::Ewma), Law::Combined(Estimator::Pcc)];
 /// Lowest factor checked.
 const LOWEST: f64 = 1e-4;
 /// Suggested value over the limit: right at the limit no other value would be stable.
@@ -51,29 +49,30 @@ pub(super) fn check(
     if let Some(found) = case.interaction() {
         return Err(vec![found]);
     }
+    let [estimates, both, alone] = [LoopKind::Estimates, LoopKind::Combined, LoopKind::Position].map(LoopKind::modes);
     let mut findings = Vec::new();
     let mut bandwidths = 1.0;
-    if let Some(unstable) = case.unstable(&ADAPTED, combined) {
-        let largest = case.largest(&ADAPTED, |factor| combined.scaled(1.0, factor));
+    if let Some(unstable) = case.unstable(&estimates, combined) {
+        let largest = case.largest(&estimates, |factor| combined.scaled(1.0, factor));
         bandwidths = largest.unwrap_or(LOWEST);
         findings.push(case.bandwidths(task, unstable, combined, largest));
     }
     // Gains are checked together with accepted bandwidths, or with the suggested ones.
     let beside = combined.scaled(1.0, bandwidths);
     let judged = task.gains.is_some() || findings.is_empty();
-    if let Some(unstable) = case.unstable(&COMBINED, &beside).filter(|_| judged) {
-        let largest = case.largest(&COMBINED, |factor| beside.scaled(factor, 1.0));
+    if let Some(unstable) = case.unstable(&both, &beside).filter(|_| judged) {
+        let largest = case.largest(&both, |factor| beside.scaled(factor, 1.0));
         findings.push(case.gains("gains", task.gains.is_some(), unstable, &beside, largest));
     }
-    if let Some(unstable) = case.unstable(&[Law::Position], position) {
-        let largest = case.largest(&[Law::Position], |factor| position.scaled(factor, 1.0));
+    if let Some(unstable) = case.unstable(&alone, position) {
+        let largest = case.largest(&alone, |factor| position.scaled(factor, 1.0));
         findings.push(case.gains("position_gains", task.position_gains.is_some(), unstable, position, largest));
     }
     if findings.is_empty() { Ok(()) } else { Err(findings) }
 }
 
 /// A law and its spectral radius.
-type Unstable = (Law, f64);
+type Unstable = (ControlMode, f64);
 
 struct Case<'a> {
     model: &'a Model,
@@ -83,7 +82,7 @@ struct Case<'a> {
 
 impl Case<'_> {
     /// The law with the largest radius, if that is too large.
-    fn unstable(&self, laws: &[Law], tuning: &Tuning) -> Option<Unstable> {
+    fn unstable(&self, laws: &[ControlMode], tuning: &Tuning) -> Option<Unstable> {
         let mut worst: Option<Unstable> = None;
         for &law in laws {
             let radius = worst_radius(self.closed_loop, law, tuning, self.conditions);
@@ -94,7 +93,7 @@ impl Case<'_> {
         worst
     }
 
-    fn largest(&self, laws: &[Law], tuning: impl Fn(f64) -> Tuning) -> Option<f64> {
+    fn largest(&self, laws: &[ControlMode], tuning: impl Fn(f64) -> Tuning) -> Option<f64> {
         largest_stable(LOWEST, 1.0, 1.2, |factor| self.unstable(laws, &tuning(factor)).is_none())
             .map(|limit| shown(SLACK * limit))
             .filter(|factor| self.unstable(laws, &tuning(*factor)).is_none())
@@ -108,7 +107,7 @@ impl Case<'_> {
             "control mode {} is unstable on this platform: the loop sampled every {} s, with modes from {:.0} Hz to \
              {:.0} Hz (damping ratio {:.3} of the first) and an amplifier lag of {} s{gauges}, has spectral radius {radius:.4} \
              somewhere in gain_ratio [{low}, {high}]{touching}; it must be below 1",
-            law.name(),
+            law,
             self.closed_loop.period,
             self.closed_loop.basis.frequencies[0] / TAU,
             self.closed_loop.basis.frequencies[5] / TAU,
@@ -119,7 +118,7 @@ impl Case<'_> {
 
     /// Checks the loop that the measured interaction force closes, whatever the gains.
     fn interaction(&self) -> Option<Diagnostic> {
-        const BARE: [Law; 1] = [Law::Feedforward(Estimator::Invhys)];
+        const BARE: [ControlMode; 1] = [ControlMode::F(Law::Invhys)];
         let unstable = self.unstable(&BARE, &Tuning::NONE)?;
         let stable_with = |factor: f64| {
             let softer = ClosedLoop {
@@ -226,13 +225,13 @@ pub(super) fn thin(
     margins: &[ModeMargins],
 ) -> Vec<Diagnostic> {
     let mut findings = Vec::new();
-    let groups: [(&[Law], &[&str]); 3] = [
-        (&ADAPTED, &["adaptation.level_bandwidth", "adaptation.level_weight", "control"]),
-        (&COMBINED, &["gains.integral", "gains.proportional", "gains", "control"]),
-        (&[Law::Position], &["position_gains.integral", "position_gains", "control"]),
+    let groups: [(LoopKind, &[&str]); 3] = [
+        (LoopKind::Estimates, &["adaptation.level_bandwidth", "adaptation.level_weight", "control"]),
+        (LoopKind::Combined, &["gains.integral", "gains.proportional", "gains", "control"]),
+        (LoopKind::Position, &["position_gains.integral", "position_gains", "control"]),
     ];
-    for (laws, keys) in groups {
-        let worst = margins.iter().filter(|one| laws.contains(&one.law)).find(|one| {
+    for (kind, keys) in groups {
+        let worst = margins.iter().filter(|one| LoopKind::of(one.law) == kind).find(|one| {
             one.gain_margin.is_some_and(|gain| gain < THIN_GAIN)
                 || one.delay_margin_ticks.is_some_and(|delay| delay < THIN_DELAY)
         });
@@ -240,7 +239,7 @@ pub(super) fn thin(
             let or = |value: Option<f64>, text: &str| value.map_or(text.to_owned(), |x| format!("{x:.2}"));
             let message = format!(
                 "control mode {} is stable with a gain margin of {} and a delay margin of {} ticks",
-                one.law.name(),
+                one.law,
                 or(one.gain_margin, "enough"),
                 or(one.delay_margin_ticks, "enough")
             );
@@ -313,7 +312,8 @@ pub(super) fn slower_than_position(
     combined: &Tuning,
     position: &Tuning,
 ) -> Option<Diagnostic> {
-    if task.mode != ControlMode::PF || model.adaptation.mode != AdaptationMode::Invhys {
+    let mode = start_mode(model, task);
+    if LoopKind::of(mode) != LoopKind::Combined || mode.law() != Law::Invhys {
         return None;
     }
     let ratio = combined.integral.iter().zip(&position.integral).fold(1.0, |most: f64, (both, alone)| {

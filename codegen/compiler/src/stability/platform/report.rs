@@ -48,7 +48,7 @@ pub fn describe(design: &Design) -> String {
         let _ = writeln!(
             text,
             "  {:<12}{:>9.5}{:>8}{:>8}{:>16}{:>12}{:>22}",
-            one.law.name(),
+            one.law.to_string(),
             one.spectral_radius,
             or(one.gain_ratio_limit, "> 10", 2),
             or(one.gain_margin, "-", 2),

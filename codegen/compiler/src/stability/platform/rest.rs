@@ -1,9 +1,10 @@
 //! Noise of the pose at rest in closed loop, from the noise of gauges and amplifiers.
 
 use super::closed_loop::{ClosedLoop, Conditions};
-use super::law::{Law, Tuning};
+use super::law::Tuning;
 use super::sampled::shown;
 use specgen_numerics::{Matrix, Matrix6, multiply6, steady_covariances, transpose6};
+use specgen_runtime::ControlMode;
 
 impl ClosedLoop {
     /// Variance of the measured pose (m², rad²) at rest under `law`: that due to the gauges, then that due to the amplifiers. `gauges`
@@ -11,7 +12,7 @@ impl ClosedLoop {
     /// the pose that the legs request. Both are white from tick to tick, and a voltage is held over a tick. Hysteresis and the steps of
     /// the converters are not included.
     #[must_use]
-    pub fn at_rest(&self, law: Law, tuning: &Tuning, gauges: &Matrix6, amplifiers: &Matrix6) -> [[f64; 6]; 2] {
+    pub fn at_rest(&self, law: ControlMode, tuning: &Tuning, gauges: &Matrix6, amplifiers: &Matrix6) -> [[f64; 6]; 2] {
         let modal = |factor: &Matrix6| multiply6(&self.basis.to_modal, factor);
         let (transition, request) = self.driven(law, tuning, &Conditions::NOMINAL, false);
         let (_, reading) = self.driven(law, tuning, &Conditions::NOMINAL, true);

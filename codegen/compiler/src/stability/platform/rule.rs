@@ -7,9 +7,10 @@
 
 use super::closed_loop::{ClosedLoop, Conditions};
 use super::damping::{self, ActiveDamping};
-use super::law::{Estimator, Law, Tuning};
+use super::law::{LoopKind, Tuning};
 use super::search::largest_stable;
 use super::{LARGEST_RADIUS, nominal_conditions};
+use specgen_runtime::{ControlMode, Law};
 
 /// Ω over the level bandwidth.
 const LEVEL: f64 = 4.5;
@@ -40,7 +41,7 @@ pub fn bandwidth_limit(closed_loop: &ClosedLoop) -> f64 {
     let fastest = 1.0 / closed_loop.period;
     largest_stable(1e-4 * fastest, fastest, 1.15, |bandwidth| {
         let tuning = Tuning { level_bandwidth: bandwidth, ..Tuning::NONE };
-        is_stable(closed_loop, Law::Feedforward(Estimator::Ewma), &tuning, &Conditions::NOMINAL)
+        is_stable(closed_loop, ControlMode::F(Law::Ewma), &tuning, &Conditions::NOMINAL)
     })
     .unwrap_or(0.0)
 }
@@ -55,18 +56,17 @@ pub(super) fn combined(
     damped: Option<&Tuning>,
     ratios: [f64; 2],
 ) -> Tuning {
-    const ADAPTED: [Law; 2] = [Law::Feedforward(Estimator::Ewma), Law::Feedforward(Estimator::Pcc)];
-    const CLOSED: [Law; 3] =
-        [Law::Combined(Estimator::Invhys), Law::Combined(Estimator::Ewma), Law::Combined(Estimator::Pcc)];
     let start = damped.copied().unwrap_or_else(|| start(closed_loop, limit));
-    let fixed: &[Law] = match (given.gains.is_some(), given.bandwidths.is_some()) {
-        (true, true) => return given.over(&start),
-        (true, false) => &CLOSED[..1],
-        (false, true) => &ADAPTED,
-        (false, false) => &[],
-    };
-    let free: Vec<Law> = ADAPTED.into_iter().chain(CLOSED).filter(|law| !fixed.contains(law)).collect();
-    shrink(closed_loop, &free, fixed, ratios, |factor| given.over(&start.scaled(factor, factor)))
+    // A mode is fixed if the spec gives all that it uses.
+    let (fixed, free): (Vec<ControlMode>, Vec<_>) =
+        [LoopKind::Estimates, LoopKind::Combined].into_iter().flat_map(LoopKind::modes).partition(|mode| {
+            (given.gains.is_some() || !mode.capabilities().feeds_back)
+                && (given.bandwidths.is_some() || mode.law() == Law::Invhys)
+        });
+    if free.is_empty() {
+        return given.over(&start);
+    }
+    shrink(closed_loop, &free, &fixed, ratios, |factor| given.over(&start.scaled(factor, factor)))
 }
 
 /// Start values of the rule.
@@ -83,7 +83,7 @@ fn start(closed_loop: &ClosedLoop, limit: f64) -> Tuning {
 }
 
 /// Adds active damping to the loop. Returns it with the gains and bandwidths of its design.
-pub(super) fn damped(closed_loop: &mut ClosedLoop, limit: f64, adapting: Estimator) -> (ActiveDamping, Tuning) {
+pub(super) fn damped(closed_loop: &mut ClosedLoop, limit: f64, adapting: Law) -> (ActiveDamping, Tuning) {
     let (damping, tuning) = damping::design(closed_loop, adapting, &start(closed_loop, limit));
     closed_loop.active_damping = Some(damping.sections);
     (damping, tuning)
@@ -97,7 +97,7 @@ pub(super) fn alone(closed_loop: &ClosedLoop, limit: f64, ratios: [f64; 2]) -> T
         integral: stiffness.map(|k| limit / INTEGRAL_ALONE * k),
         ..Tuning::NONE
     };
-    shrink(closed_loop, &[Law::Position], &[], ratios, |factor| start.scaled(factor, factor))
+    shrink(closed_loop, &LoopKind::Position.modes(), &[], ratios, |factor| start.scaled(factor, factor))
 }
 
 /// The values of a tuning in the spec.
@@ -129,7 +129,7 @@ fn proportional(closed_loop: &ClosedLoop) -> f64 {
     if closed_loop.notch.is_some() { PROPORTIONAL } else { PROPORTIONAL_PLAIN }
 }
 
-pub(super) fn is_stable(closed_loop: &ClosedLoop, law: Law, tuning: &Tuning, conditions: &Conditions) -> bool {
+pub(super) fn is_stable(closed_loop: &ClosedLoop, law: ControlMode, tuning: &Tuning, conditions: &Conditions) -> bool {
     closed_loop.spectral_radius(law, tuning, conditions) <= LARGEST_RADIUS
 }
 
@@ -139,8 +139,8 @@ pub(super) fn is_stable(closed_loop: &ClosedLoop, law: Law, tuning: &Tuning, con
 /// rule cannot fix that.
 fn shrink(
     closed_loop: &ClosedLoop,
-    laws: &[Law],
-    fixed: &[Law],
+    laws: &[ControlMode],
+    fixed: &[ControlMode],
     ratios: [f64; 2],
     tuning: impl Fn(f64) -> Tuning,
 ) -> Tuning {

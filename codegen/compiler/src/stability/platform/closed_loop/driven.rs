@@ -1,15 +1,16 @@
 //! Response of the loop to six inputs: a correction of the request, or an error of the motion.
 
-use super::{Assembly, ClosedLoop, Conditions, Estimator, Law, Tuning, shown};
+use super::{Assembly, ClosedLoop, Conditions, Tuning, shown};
 use specgen_numerics::nyquist::{Complex, times};
 use specgen_numerics::{Matrix, Resolvent};
+use specgen_runtime::{ControlMode, Law};
 
 impl ClosedLoop {
     /// The matrix of a tick, and the effect of six inputs in modal coordinates on the states: a correction of the request, or an error
     /// of the readings.
     pub(in super::super) fn driven(
         &self,
-        law: Law,
+        law: ControlMode,
         tuning: &Tuning,
         conditions: &Conditions,
         on_gauges: bool,
@@ -24,7 +25,7 @@ impl ClosedLoop {
     #[must_use]
     pub fn correction_response(
         &self,
-        law: Law,
+        law: ControlMode,
         tuning: &Tuning,
         conditions: &Conditions,
         angles: &[f64],
@@ -44,7 +45,7 @@ impl ClosedLoop {
     /// Readings at the end of each interval under open-loop requests, all in modal coordinates, from rest.
     #[must_use]
     pub fn without_feedback(&self, requests: &[[f64; 6]]) -> Vec<[f64; 6]> {
-        let law = Law::Feedforward(Estimator::Invhys);
+        let law = ControlMode::F(Law::Invhys);
         let (transition, input) = self.driven(law, &Tuning::NONE, &Conditions::NOMINAL, false);
         let shown = shown(self.lags_used()[1]);
         let mut found = Vec::with_capacity(requests.len());
@@ -57,7 +58,7 @@ impl ClosedLoop {
     /// Closed-loop error for an error that the readings would have at the start of each interval without feedback, from rest, all in
     /// modal coordinates.
     #[must_use]
-    pub fn left(&self, law: Law, tuning: &Tuning, errors: &[[f64; 6]]) -> Vec<[f64; 6]> {
+    pub fn left(&self, law: ControlMode, tuning: &Tuning, errors: &[[f64; 6]]) -> Vec<[f64; 6]> {
         let (transition, input) = self.driven(law, tuning, &Conditions::NOMINAL, true);
         let shown = shown(self.lags_used()[1]);
         let mut given = errors.iter();
