@@ -10,7 +10,7 @@ use specgen_tests::repository;
 const WIDTH: usize = 120;
 /// Pages whose lines are those of emitted files.
 const EMITTED: &str = "codegen/compiler/src/emit/pages";
-/// Words of all pages in `docs`, code and numbers left out.
+/// Words of the hand-written pages in `docs`, as `wc -w` counts them.
 const WORDS: usize = 40_000;
 /// Lines of the two pages that everyone reads.
 const LINES: [(&str, usize); 2] = [("README.md", 80), ("ARCHITECTURE.md", 100)];
@@ -117,10 +117,9 @@ fn too_long(text: &str, width: usize) -> Vec<usize> {
     lines.map(|(number, _)| number).collect()
 }
 
-/// Words outside of code blocks: what has a letter.
+/// Words as `wc -w` counts them: code, numbers and the bars of tables too.
 fn words(text: &str) -> usize {
-    let is_word = |word: &&str| word.contains(char::is_alphabetic);
-    prose(text).iter().map(|(_, line)| line.split_whitespace().filter(is_word).count()).sum()
+    text.split_whitespace().count()
 }
 
 /// Banned words in a text, with their lines; code is left out.
@@ -153,7 +152,9 @@ fn the_documentation_keeps_its_length() {
         let lines = fs::read_to_string(repository().join(name)).unwrap().lines().count();
         assert!(lines <= most, "{name} has {lines} lines; at most {most}");
     }
-    let words: usize = pages("docs").iter().map(|(_, text)| words(text)).sum();
+    let pages = pages("docs");
+    let written = pages.iter().filter(|(name, _)| !GENERATED.iter().any(|page| name.ends_with(page)));
+    let words: usize = written.map(|(_, text)| words(text)).sum();
     println!("{words} words in docs");
     assert!((10_000..=WORDS).contains(&words), "docs has {words} words; at most {WORDS}");
 }
@@ -276,7 +277,7 @@ fn what_is_too_long_or_banned_is_found() {
     let (good, bad) = ("a".repeat(WIDTH), "ä".repeat(WIDTH + 1));
     let text = format!("{good}\n{bad}\n| {good} | {good} |\n| x | {bad} |\n```text\n{bad}\n```\n{bad}\n");
     assert_eq!(too_long(&text, WIDTH), [2, 4, 8]);
-    assert_eq!(words("One, two - `three` 4\n```sh\nfive\n```\n| six | 7 |"), 4);
+    assert_eq!(words("One, two - `three` 4\n```sh\nfive\n```\n| six | 7 |"), 13);
     let text = "A machine that Stands,\nunderstands `stands` standard\n```text\nsoak\n```\nis told";
     assert_eq!(banned(text), [(1, "stands"), (6, "told")]);
     let source = "/// As told.\nlet desk = \"it stands\"; // `said`, anew\n";
