@@ -174,6 +174,11 @@ impl Exchange {
         }
     }
 
+    /// New settings. A machine that the host steps has them at once, because no tick takes them over.
+    pub(crate) const fn configure(&mut self, config: Config) {
+        if self.in_lockstep() { self.config = config } else { self.next = Some(config) }
+    }
+
     /// Work after a tick's codes are written, needed by the next tick: new settings, the next set-point of a wave, or
     /// the next correction of a pass.
     pub fn prepare(&mut self) {

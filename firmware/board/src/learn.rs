@@ -3,7 +3,7 @@
 use controller::passes;
 
 use crate::exchange::Access;
-use crate::handler::standing;
+use crate::requests::pass_status;
 
 /// Steps per call, at most a few thousand products each, so that record, samples and the sign of life are not late.
 const STEPS: u32 = 2;
@@ -17,7 +17,7 @@ pub fn learn(with: &mut Access<'_>) {
     let mut player = None;
     with(&mut |exchange, _| {
         player = exchange.player.take_if(|player| player.is_busy() && !player.is_running());
-        exchange.away = player.as_ref().map(standing);
+        exchange.away = player.as_ref().map(pass_status);
     });
     let Some(mut learning) = player else { return };
     learning.work(STEPS);

@@ -4,7 +4,7 @@
 //! timer ─► Schedule ─missed─► Board::tick: Gauges ─codes─► supervise ─codes─► Amplifiers
 //!                               ▲ commands, wave │ report, record
 //!                               │                ▼
-//! link  ◄─► Endpoint ◄─► LinkHandler ◄────► Exchange
+//! link  ◄─► Endpoint ◄─► requests ◄─► LinkHandler ◄─► Exchange
 //! ```
 //! The timer's interrupt owns [`Board`], the background owns the link. [`Exchange`] connects them; its lock is held
 //! only for copies. The supervisor makes every decision about control: a board collects faults and reports them as
@@ -25,8 +25,10 @@ mod health;
 mod learn;
 mod recording;
 mod report;
+mod requests;
 mod samples;
 mod schedule;
+#[cfg(feature = "lockstep")]
 mod stepper;
 mod words;
 
@@ -39,8 +41,8 @@ pub use handler::{LinkHandler, RequestContext};
 pub use health::{BACKGROUND_SILENCE, Health, RAMPED_DOWN};
 pub use learn::learn;
 pub use recording::MachineSnapshot;
-pub use report::{Probes, Report};
-pub use samples::SampleMemory;
+pub use report::{Probes, Report, Stopwatch};
+pub use requests::{Backend, Command, execute, pass_status, wave_refusal};
+pub use samples::{SampleMemory, sample};
 pub use schedule::{DueTick, Schedule};
-pub use stepper::Stopwatch;
 pub use words::{GAUGE_BITS, PERIOD_NANOSECONDS};

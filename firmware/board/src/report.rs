@@ -1,8 +1,8 @@
-//! Results of the ticks, and the probes that measure them.
+//! Results of the ticks, and what measures them.
 
 use controller::supervised::{Cause, Phase};
 use specgen_hal::Fault;
-use specgen_link::Health;
+use specgen_link::{CostUnit, Counters, Health, Status};
 use specgen_runtime::supervisor::OF_GAUGES;
 
 /// Probes of times and stack.
@@ -19,6 +19,20 @@ pub struct Probes {
 impl Probes {
     /// No probes: on a host.
     pub const NONE: Self = Self { hertz: 0, stack: || [0; 2], reset_cause: 0 };
+}
+
+/// Counter of a tick's cost.
+#[derive(Debug, Clone, Copy)]
+pub struct Stopwatch {
+    /// What it counts.
+    pub counted: CostUnit,
+    /// The counter, which wraps around. Read while nothing interrupts.
+    pub now: fn() -> u32,
+}
+
+impl Stopwatch {
+    /// No counter: on a host.
+    pub const NONE: Self = Self { counted: CostUnit::Nothing, now: || 0 };
 }
 
 /// Results of the ticks.
@@ -114,6 +128,24 @@ impl Report {
             latest: 0,
         },
     };
+
+    /// As a message of the link.
+    pub(crate) fn status(&self) -> Status {
+        Status {
+            tick: self.tick,
+            phase: self.phase.word() as u8,
+            cause: self.cause.word() as u8,
+            finding: self.finding,
+            amplifier_on: self.amplifier_on,
+            status: self.status,
+            events: self.health.events,
+            late: self.missed,
+            // A board whose ticks stop is reset by its watchdog.
+            age: if self.tick > 0 { Some(0) } else { None },
+            // The endpoint fills it in.
+            link: Counters::NONE,
+        }
+    }
 
     /// A tick has run: its delay, its duration, and the time from its end to the next one; counts.
     pub const fn record_tick(&mut self, late: u32, duration: u32, period: u32) {

@@ -32,18 +32,22 @@ pub(crate) struct TickSample {
 
 impl TickSample {
     pub(crate) fn sample(&self) -> Sample {
-        let [target, pose] = self.shown;
-        let (mut error, mut volts) = ([0.0; AXES], [0.0; AXES]);
-        for (slot, (target, pose)) in error.iter_mut().zip(target.iter().zip(&pose)) {
-            *slot = (target - pose) as f32;
-        }
-        for (slot, code) in volts.iter_mut().zip(self.codes) {
-            *slot = DAC.voltage(code) as f32;
-        }
-        let rounded = |values: [Real; AXES]| values.map(|value| value as f32);
-        let Self { tick, status, phase, .. } = *self;
-        Sample { tick, status, phase, pose: rounded(pose), target: rounded(target), error, volts }
+        let Self { tick, status, phase, shown, codes } = *self;
+        sample(tick, status, phase, shown, codes.map(|code| DAC.voltage(code)))
     }
+}
+
+/// A tick's results for a host: `shown` are set-point and pose, `volts` the voltages of the legs.
+#[must_use]
+pub fn sample(tick: u64, status: u32, phase: u8, shown: [[Real; AXES]; 2], volts: [Real; LEGS]) -> Sample {
+    let rounded = |values: [Real; AXES]| values.map(|value| value as f32);
+    let [target, pose] = shown;
+    let mut error = target;
+    for (error, pose) in error.iter_mut().zip(pose) {
+        *error -= pose;
+    }
+    let [pose, target, error, volts] = [pose, target, error, volts].map(rounded);
+    Sample { tick, status, phase, pose, target, error, volts }
 }
 
 /// Memory for samples, 6 KiB. It need not be initialised.

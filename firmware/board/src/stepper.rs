@@ -6,23 +6,10 @@ use controller::{CONFIG_WORDS, Config, DESCRIPTION};
 use specgen_link::{CostUnit, Stage, lockstep};
 
 use crate::exchange::{self, Access};
+use crate::report::Stopwatch;
 
 /// Name of the whole tick.
 const WHOLE: &str = "supervise";
-
-/// Counter of a tick's cost.
-#[derive(Debug, Clone, Copy)]
-pub struct Stopwatch {
-    /// What it counts.
-    pub counted: CostUnit,
-    /// The counter, which wraps around. Read while nothing interrupts.
-    pub now: fn() -> u32,
-}
-
-impl Stopwatch {
-    /// No counter: on a host.
-    pub const NONE: Self = Self { counted: CostUnit::Nothing, now: || 0 };
-}
 
 /// Cost of ticks since power-up.
 #[derive(Debug, Clone, Copy)]
@@ -83,10 +70,7 @@ impl lockstep::Machine for Stepper<'_, '_> {
     fn configure(&mut self, config: &[u64]) -> Result<(), usize> {
         let words = config.first_chunk().ok_or(CONFIG_WORDS)?;
         let config = Config::from_words(words).map_err(|error| error.word)?;
-        (self.with)(&mut |exchange, _| {
-            // While the host steps the machine, no tick takes them over.
-            if exchange.in_lockstep() { exchange.config = config } else { exchange.next = Some(config) }
-        });
+        (self.with)(&mut |exchange, _| exchange.configure(config));
         Ok(())
     }
 

@@ -67,11 +67,6 @@ impl<const N: usize> Session<N> {
         self.bytes.as_flattened_mut()
     }
 
-    /// Words as the bytes of an answer; none if they do not fit.
-    pub fn answer(&mut self, words: &[u64]) -> Option<Bytes<'_>> {
-        put_words(words, self.bytes.as_flattened_mut())
-    }
-
     /// [`Request::WriteConfig`].
     pub fn configure(&mut self, machine: &mut impl Machine, config: Bytes<'_>) -> Reply<'static> {
         let [count, ..] = machine.words();
@@ -159,7 +154,7 @@ impl<M: Machine> Device for Lockstep<M> {
     fn execute(&mut self, request: &Request<'_>) -> Reply<'_> {
         match *request {
             Request::Hello => Reply::Identity(self.identity()),
-            Request::Describe { offset } => piece(self.machine.description().as_bytes(), offset),
+            Request::Describe { offset } => piece(self.machine.description().as_bytes(), offset, PIECE),
             Request::WriteConfig { words } => self.session.configure(&mut self.machine, words),
             Request::LockstepReset { config } => self.session.reset(&mut self.machine, config),
             Request::LockstepStep { input } => self.session.step(&mut self.machine, input),
@@ -171,10 +166,10 @@ impl<M: Machine> Device for Lockstep<M> {
     }
 }
 
-/// The bytes of something longer from `offset` on, as many as an answer can have.
+/// The bytes of something longer from `offset` on, at most `most`.
 #[must_use]
-pub fn piece(whole: &[u8], offset: u32) -> Reply<'_> {
+pub fn piece(whole: &[u8], offset: u32, most: usize) -> Reply<'_> {
     let rest = whole.get(offset as usize..).unwrap_or_default();
-    let bytes = Bytes(rest.get(..PIECE).unwrap_or(rest));
+    let bytes = Bytes(rest.get(..most).unwrap_or(rest));
     Reply::Chunk { offset, total: whole.len() as u32, bytes }
 }

@@ -11,6 +11,9 @@
 
 use serde::Serialize;
 
+use crate::bytes::Bytes;
+use crate::message::Reply;
+
 /// Axes of a pose, and legs.
 pub const AXES: usize = 6;
 /// Most ticks of a row.
@@ -97,6 +100,13 @@ impl Block {
     #[must_use]
     pub fn bytes(&self) -> &[u8] {
         self.bytes.get(..self.length).unwrap_or_default()
+    }
+
+    /// As an answer; `more`: whether a complete block waits after it.
+    #[must_use]
+    pub fn reply(&self, more: bool) -> Reply<'_> {
+        let Self { number, tick, every, .. } = *self;
+        Reply::Samples { number, tick, every, more, rows: Bytes(self.bytes()) }
     }
 
     fn is_full(&self) -> bool {

@@ -6,7 +6,8 @@ use std::collections::VecDeque;
 use controller::supervised::Phase;
 use controller::waves::{self, Wave};
 use controller::{Config, GAUGE_FAULT, PLACE_WORDS, Real, passes};
-use specgen_link::{EdgeStatus, Health};
+use specgen_board::wave_refusal;
+use specgen_link::{EdgeStatus, Health, Refusal};
 use specgen_runtime::pass::Course;
 use specgen_runtime::pending::{self, EDGE};
 use specgen_runtime::playback::Knot;
@@ -20,14 +21,6 @@ use crate::words::Command;
 
 /// Commands that may wait for room in the ring: the loop takes one a tick.
 const MOST_ORDERS: usize = 64;
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Rejection {
-    /// Not in this state of the machine, of the wave, of the pass or of the recorder.
-    State,
-    /// This word of the request.
-    Word(usize),
-}
 
 pub struct Console {
     pub operator: Operator,
@@ -160,13 +153,13 @@ impl Console {
     /// # Errors
     /// If the machine does not run, or plays something else; if a wave or a pass is under way; or the word of the axis
     /// that would exceed its limits.
-    pub fn start_wave(&mut self, settings: &Settings<Real>, on_edge: bool) -> Result<(), Rejection> {
+    pub fn start_wave(&mut self, settings: &Settings<Real>, on_edge: bool) -> Result<(), Refusal> {
         let limits = waves::limits(&self.config);
         let running = self.said.filter(|said| said.phase == Phase::Running);
-        let Some(said) = running.filter(|_| !self.is_engaged()) else { return Err(Rejection::State) };
-        Wave::new(limits).set(settings).map_err(|refused| refused.word().map_or(Rejection::State, Rejection::Word))?;
+        let Some(said) = running.filter(|_| !self.is_engaged()) else { return Err(Refusal::State) };
+        Wave::new(limits).set(settings).map_err(wave_refusal)?;
         waves::may_begin(said.status, self.operator.command(), &settings.center, &limits)
-            .map_err(|_| Rejection::State)?;
+            .map_err(|_| Refusal::State)?;
         // The command after the wave is sent first.
         self.operator.rest_at(&settings.center);
         self.wish();
@@ -183,12 +176,12 @@ impl Console {
     ///
     /// # Errors
     /// If the machine does not run at rest, or a wave or a pass is under way.
-    pub fn command_on_edge(&mut self, command: Command) -> Result<(), Rejection> {
+    pub fn command_on_edge(&mut self, command: Command) -> Result<(), Refusal> {
         let rests = self
             .said
             .is_some_and(|said| said.phase == Phase::Running && said.status & specgen_runtime::setpoint::BUSY == 0);
         if !rests || self.is_engaged() {
-            return Err(Rejection::State);
+            return Err(Refusal::State);
         }
         self.wish();
         let number = self.order(LoopCommand::Await(EdgeCommand::Command(command)));
@@ -210,11 +203,11 @@ impl Console {
     ///
     /// # Errors
     /// If a pass or learning is under way, or they do not fit.
-    pub fn put_knots(&mut self, first: u32, knots: impl ExactSizeIterator<Item = Knot>) -> Result<(), Rejection> {
+    pub fn put_knots(&mut self, first: u32, knots: &[Knot]) -> Result<(), Refusal> {
         match self.passes.is_busy() {
-            true => Err(Rejection::State),
-            false if self.passes.put(first, knots) => Ok(()),
-            false => Err(Rejection::Word(0)),
+            true => Err(Refusal::State),
+            false if self.passes.put(first, knots.iter().copied()) => Ok(()),
+            false => Err(Refusal::Word { index: 0 }),
         }
     }
 
@@ -222,13 +215,13 @@ impl Console {
     ///
     /// # Errors
     /// If the machine does not run at rest, a wave or a pass is under way, or the pass is invalid or too long.
-    pub fn begin_pass(&mut self, course: Course) -> Result<(), Rejection> {
+    pub fn begin_pass(&mut self, course: Course) -> Result<(), Refusal> {
         let running = self.said.filter(|said| said.phase == Phase::Running);
-        let said = running.filter(|_| !self.is_engaged()).ok_or(Rejection::State)?;
+        let said = running.filter(|_| !self.is_engaged()).ok_or(Refusal::State)?;
         if !passes::may_begin(said.status, self.operator.command()) {
-            return Err(Rejection::State);
+            return Err(Refusal::State);
         }
-        let player = self.passes.begin(course).ok_or(Rejection::Word(0))?;
+        let player = self.passes.begin(course).ok_or(Refusal::Word { index: 0 })?;
         self.wish();
         self.order(LoopCommand::Pass(player));
         Ok(())
@@ -252,9 +245,9 @@ impl Console {
     ///
     /// # Errors
     /// If that many do not fit.
-    pub fn arm_recorder(&mut self, after: u32) -> Result<(), Rejection> {
+    pub fn arm_recorder(&mut self, after: u32) -> Result<(), Refusal> {
         if after > CAPACITY {
-            return Err(Rejection::Word(0));
+            return Err(Refusal::Word { index: 0 });
         }
         let order = self.capture.arm(after, self.number.wrapping_add(1));
         self.order(order);
@@ -347,7 +340,7 @@ mod tests {
             .order(LoopCommand::Request(OperatorRequest { command: Some([7; COMMAND_WORDS]), request: Request::Run }));
         console.start_wave(&Settings::still(), true).unwrap();
         console.start_wave(&Settings::still(), false).unwrap();
-        assert_eq!(console.command_on_edge([1; COMMAND_WORDS]), Err(Rejection::State), "under a wave");
+        assert_eq!(console.command_on_edge([1; COMMAND_WORDS]), Err(Refusal::State), "under a wave");
         let numbers = (console.outgoing().0.len(), console.outgoing().1);
         assert!(console.is_engaged());
         console.stop();
@@ -387,16 +380,16 @@ mod tests {
     #[test]
     fn a_wave_or_a_command_begins_from_a_machine_that_runs_at_rest() {
         let still = Settings::still();
-        assert_eq!(console(Phase::Holding).start_wave(&still, false), Err(Rejection::State));
-        assert_eq!(console(Phase::Holding).command_on_edge([0; COMMAND_WORDS]), Err(Rejection::State));
+        assert_eq!(console(Phase::Holding).start_wave(&still, false), Err(Refusal::State));
+        assert_eq!(console(Phase::Holding).command_on_edge([0; COMMAND_WORDS]), Err(Refusal::State));
         let mut console = console(Phase::Running);
         console.said = Some(SupervisorReport { status: specgen_runtime::setpoint::BUSY, ..said(Phase::Running) });
-        assert_eq!(console.start_wave(&still, false), Err(Rejection::State));
-        assert_eq!(console.command_on_edge([0; COMMAND_WORDS]), Err(Rejection::State));
+        assert_eq!(console.start_wave(&still, false), Err(Refusal::State));
+        assert_eq!(console.command_on_edge([0; COMMAND_WORDS]), Err(Refusal::State));
         console.said = Some(said(Phase::Running));
         let mut far = still;
         far.center[1] = 1.0;
-        assert!(matches!(console.start_wave(&far, false), Err(Rejection::Word(_))));
+        assert!(matches!(console.start_wave(&far, false), Err(Refusal::Word { index: _ })));
         assert!(console.outgoing().0.is_empty());
         console.operator.set_by_link([1; COMMAND_WORDS]);
         console.start_wave(&still, false).unwrap();
@@ -440,13 +433,13 @@ mod tests {
     #[test]
     fn a_pass_takes_the_player_along_and_what_it_began_is_commanded() {
         let mut console = console(Phase::Running);
-        assert_eq!(console.put_knots(0, [[1; 6]].into_iter()), Err(Rejection::Word(0)), "there is no player");
+        assert_eq!(console.put_knots(0, &[[1; 6]]), Err(Refusal::Word { index: 0 }), "there is no player");
         console.passes = Passes::with(8);
-        assert_eq!(console.put_knots(0, [[1; 6]].into_iter()), Ok(()));
-        assert_eq!(console.put_knots(9, [[1; 6]].into_iter()), Err(Rejection::Word(0)));
+        assert_eq!(console.put_knots(0, &[[1; 6]]), Ok(()));
+        assert_eq!(console.put_knots(9, &[[1; 6]]), Err(Refusal::Word { index: 0 }));
         let course = Course { spacing: 1, before: 0, ticks: 2, trajectory: 3 };
         // This controller takes no correction, and so makes no pass.
-        assert_eq!(console.begin_pass(course), Err(Rejection::State));
+        assert_eq!(console.begin_pass(course), Err(Refusal::State));
         console.abort_pass();
         assert!(matches!(console.outgoing().0.back(), Some(LoopCommand::AbortPass)));
         for (phase, expected) in [(Phase::Holding, 0), (Phase::Running, 3)] {
@@ -462,7 +455,7 @@ mod tests {
     #[test]
     fn there_is_room_for_so_many_orders_and_for_so_many_ticks() {
         let mut console = console(Phase::Holding);
-        assert_eq!(console.arm_recorder(CAPACITY + 1), Err(Rejection::Word(0)));
+        assert_eq!(console.arm_recorder(CAPACITY + 1), Err(Refusal::Word { index: 0 }));
         assert_eq!(console.arm_recorder(CAPACITY), Ok(()));
         console.trigger_recorder();
         console.stop_recorder();

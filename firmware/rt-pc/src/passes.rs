@@ -1,6 +1,7 @@
 //! The player of passes, as the service sees it: away during a pass, here between passes.
 
-use controller::passes;
+use controller::{Real, passes};
+use specgen_board::pass_status;
 use specgen_link::PassStatus;
 use specgen_runtime::learning::Settings;
 use specgen_runtime::pass::{self, Course, Stage};
@@ -38,7 +39,7 @@ impl Passes {
     /// Its status; none if there are no passes.
     pub fn status(&self) -> Option<PassStatus> {
         let away = PassStatus { stage: Stage::Running.word(), status: 0, knots: 0, capacity: MEMORY as u32 / 2 };
-        passes::POSSIBLE.then(|| self.here.as_ref().map_or(away, standing))
+        passes::POSSIBLE.then(|| self.here.as_ref().map_or(away, |player| pass_status(player)))
     }
 
     /// Stores knots of the correction; false during a pass, or if they do not fit.
@@ -51,14 +52,9 @@ impl Passes {
         self.here.take_if(|player| player.begin(course))
     }
 
-    /// Errors of the last pass; none during one.
-    pub fn errors(&self) -> Option<&[Knot]> {
-        self.here.as_ref().map(|player| player.errors())
-    }
-
-    /// The correction of the next pass; none during one.
-    pub fn correction(&self) -> Option<&[Knot]> {
-        self.here.as_ref().map(|player| player.correction())
+    /// The player between two passes.
+    pub fn player(&self) -> Option<&pass::Player<'static, Real>> {
+        self.here.as_deref()
     }
 
     /// Starts to compute the correction of the next pass; false if no pass is complete, or there is no plan for it.
@@ -78,15 +74,6 @@ impl Passes {
         let begun = player.begun();
         self.here = Some(player);
         begun
-    }
-}
-
-fn standing(player: &Player) -> PassStatus {
-    PassStatus {
-        stage: player.stage().word(),
-        status: player.status(),
-        knots: player.errors().len() as u32,
-        capacity: player.capacity() as u32,
     }
 }
 
@@ -113,17 +100,17 @@ mod tests {
         assert!(passes.begin(Course { ticks: 0, ..COURSE }).is_none());
         let mut player = passes.begin(COURSE).unwrap();
         assert!(passes.begin(COURSE).is_none() && !passes.put(0, knots.into_iter()));
-        assert_eq!((passes.errors(), passes.correction()), (None, None));
+        assert!(passes.player().is_none());
         assert_eq!((passes.is_running(), passes.is_busy()), (passes::POSSIBLE, passes::POSSIBLE));
         for _ in 0..4 {
             let _ = player.give();
             player.keep(&[1e-9; 6], &[0.0; 6], 4);
         }
-        let found = standing(&player);
+        let found = pass_status(&player);
         assert_eq!((found.stage, found.status, found.knots, found.capacity), (Stage::Complete.word(), 4, 3, 4));
         assert_eq!(passes.receive(player), Some(5));
-        assert_eq!(passes.errors(), Some([[1000; 6]; 3].as_slice()));
-        assert_eq!(passes.correction(), Some(knots.as_slice()));
+        assert_eq!(passes.player().unwrap().errors(), [[1000; 6]; 3]);
+        assert_eq!(passes.player().unwrap().correction(), knots);
         assert!(!passes.is_running() && !passes.is_busy());
         // An aborted one had begun nothing.
         let mut player = passes.begin(COURSE).unwrap();
@@ -156,7 +143,7 @@ mod tests {
         assert!(passes.learn(Settings { reach: 0, fade: [0, 0] }));
         assert!(!passes.put(0, [[0; 6]].into_iter()), "while it learns");
         passes.work();
-        assert_eq!(passes.correction(), Some([[501; 6], [502; 6], [503; 6]].as_slice()));
+        assert_eq!(passes.player().unwrap().correction(), [[501; 6], [502; 6], [503; 6]]);
         assert!(passes.begin(COURSE).is_some());
     }
 }

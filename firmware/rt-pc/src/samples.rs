@@ -1,17 +1,16 @@
 //! Ticks for subscribed hosts, each with its own row length. The service makes them from the loop's rows; the loop is
 //! not involved.
 
-use controller::{PLACE_WORDS, Real};
+use controller::Real;
+use controller::snapshot::recorder;
 use specgen_link::samples::{AXES, Block, Collector, MOST_EVERY, Sample};
-use specgen_link::{Bytes, Refusal, Reply};
+use specgen_link::{Refusal, Reply};
 use specgen_runtime::Real as _;
 
 use crate::handover::Row;
 
 /// Blocks that wait for a host: 0.9 s at 10 kHz, tick by tick.
 const BLOCKS: usize = 1024;
-/// Whether there is a pose: six legs have none.
-const POSSIBLE: bool = PLACE_WORDS >= 4 * AXES;
 
 /// Stream of a subscribed host; nothing until its first request.
 #[derive(Default)]
@@ -21,11 +20,8 @@ impl Stream {
     /// Starts rows of `every` ticks; 0 stops them.
     ///
     /// # Errors
-    /// If there is no pose, or a row is too long.
+    /// If a row is too long.
     pub fn start(&mut self, every: u32) -> Result<(), Refusal> {
-        if !POSSIBLE {
-            return Err(Refusal::Unsupported);
-        }
         if every > MOST_EVERY {
             return Err(Refusal::Word { index: 0 });
         }
@@ -48,8 +44,7 @@ impl Stream {
     pub fn take(&mut self) -> Reply<'_> {
         let more = self.0.as_ref().is_some_and(|collector| collector.waiting() > 1);
         let block = self.0.as_mut().and_then(Collector::take).unwrap_or(&Block::EMPTY);
-        let Block { number, tick, every, .. } = *block;
-        Reply::Samples { number, tick, every, more, rows: Bytes(block.bytes()) }
+        block.reply(more)
     }
 }
 
@@ -57,23 +52,15 @@ fn sample(row: &Row) -> Sample {
     let six = |first: usize| -> [Real; AXES] {
         core::array::from_fn(|axis| row.place.get(first + axis).map_or(0.0, |word| Real::from_word(*word)))
     };
-    let rounded = |values: [Real; AXES]| values.map(|value| value as f32);
-    let (pose, target) = (six(0), six(AXES));
-    Sample {
-        tick: row.tick,
-        status: row.output.status,
-        phase: row.output.supervisor as u8,
-        pose: rounded(pose),
-        target: rounded(target),
-        error: rounded(core::array::from_fn(|axis| target[axis] - pose[axis])),
-        volts: rounded(six(3 * AXES)),
-    }
+    let recorder::Row { status, supervisor, .. } = row.output;
+    specgen_board::sample(row.tick, status, supervisor as u8, [six(AXES), six(0)], six(3 * AXES))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::bench::row;
+    use specgen_link::Bytes;
     use specgen_link::samples::rows;
 
     fn shown(tick: u64) -> Row {

@@ -105,7 +105,7 @@ const PARTS: [Part; 11] = [
         member: false,
         what: "the controller on a real-time Linux PC",
         needs: "Linux, packages of its `Cargo.toml`; feature `comedi`: Rust 1.88",
-        with: &["hal", "link", "rt"],
+        with: &["board", "hal", "link", "rt"],
     },
 ];
 

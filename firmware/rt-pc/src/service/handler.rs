@@ -1,20 +1,21 @@
 //! The link commands of a run.
 
-use controller::supervised::{Cause, MACHINE_INPUT_WORDS, MACHINE_OUTPUT_WORDS, Phase, Request as Wanted};
-use controller::{COMMAND_WORDS, CONFIG_WORDS, Config, DESCRIPTION, PLACE_WORDS, Real, passes, triggers};
+use controller::supervised::{Cause, Phase, Request as Wanted};
+use controller::{CONFIG_WORDS, Config, PLACE_WORDS, Real};
+use specgen_board::{Backend, Command, execute};
+use specgen_link::lockstep::piece;
 use specgen_link::{
-    Bytes, CostUnit, Counters, Device, Health, Identity, KNOT, KNOTS, PassAction, RecorderAction, RecorderStatus,
-    Refusal, Reply, Request, Status, WaveAction, put_knots, put_words,
+    Bytes, CostUnit, Counters, Device, EdgeStatus, Health, KNOT, KNOTS, PassAction, PassStatus, RecorderAction,
+    RecorderStatus, Refusal, Reply, Request, Status, put_knots,
 };
 use specgen_runtime::learning;
-use specgen_runtime::pass::Course;
+use specgen_runtime::pass::{Course, Player};
 use specgen_runtime::playback::Knot;
-use specgen_runtime::wave::{self, Settings};
+use specgen_runtime::wave::Settings;
 
 use crate::capture::CAPACITY;
-use crate::console::{Console, Rejection};
+use crate::console::Console;
 use crate::operator::{ControlRefusal, HostId};
-use crate::passes::Passes;
 use crate::samples::Stream;
 
 /// Bytes of a piece of something longer.
@@ -51,51 +52,12 @@ impl<'a> LinkHandler<'a> {
         Self { console, host, is_late, events, stream, now, words, knots: [0; KNOTS * KNOT] }
     }
 
-    fn status(&self) -> Reply<'static> {
-        // Before the first tick it is as at power-up.
-        let said = self.console.said.as_ref();
-        Reply::Status(Status {
-            tick: said.map_or(0, |said| said.tick + 1),
-            phase: said.map_or(Phase::Disarmed, |said| said.phase).word() as u8,
-            cause: said.map_or(Cause::None, |said| said.cause).word() as u8,
-            finding: said.map_or(0, |said| said.finding.word() as u16),
-            amplifier_on: said.is_some_and(|said| said.on),
-            status: said.map_or(0, |said| said.status),
-            events: *self.events,
-            late: said.map_or(0, |said| u32::try_from(said.late).unwrap_or(u32::MAX)),
-            age: self.since(self.console.ticked),
-            // The endpoint fills it in.
-            link: Counters::NONE,
-        })
-    }
-
     /// From then to now, µs.
     fn since(&self, then: Option<u64>) -> Option<u64> {
         then.map(|then| self.now.saturating_sub(then) / 1000)
     }
 
-    fn health(&mut self) -> Reply<'static> {
-        Reply::Health(Health { events: core::mem::take(self.events), ..self.console.health })
-    }
-
-    fn place(&mut self) -> Reply<'_> {
-        let Reply::Status(Status { tick, phase, status, .. }) = self.status() else {
-            return Reply::Refused(Refusal::State);
-        };
-        let measured = self.since(self.console.measured);
-        match put_words(&self.console.place, &mut self.words) {
-            Some(words) if PLACE_WORDS > 0 => Reply::Place { tick, phase, status, measured, words },
-            _ => Reply::Refused(Refusal::Unsupported),
-        }
-    }
-
-    /// Gives control to this host, then does `what`.
-    fn ordered(&mut self, what: impl FnOnce(&mut Self) -> Result<(), Refusal>) -> Reply<'static> {
-        // A host that sends commands faster than the loop takes them must not delay other hosts.
-        let done = if self.console.is_full() { Err(Refusal::Busy) } else { self.take().and_then(|()| what(self)) };
-        done.map_or_else(Reply::Refused, |()| Reply::Done)
-    }
-
+    /// Gives control to this host.
     fn take(&mut self) -> Result<(), Refusal> {
         if self.is_late {
             return Err(Refusal::Busy);
@@ -106,230 +68,191 @@ impl<'a> LinkHandler<'a> {
         })
     }
 
-    /// A request that slows the machine down is accepted from every host.
-    fn supervise(&mut self, request: u8) -> Result<(), Refusal> {
-        let wanted = Wanted::from_word(u64::from(request));
-        if wanted.word() != u64::from(request) {
-            return Err(Refusal::Word { index: 0 });
+    /// Refuses while another host is in control, or the queue of commands is full.
+    fn admit(&self) -> Result<(), Refusal> {
+        let others = !self.console.operator.may_order(self.host, self.now) || self.console.is_full();
+        if others { Err(Refusal::Busy) } else { Ok(()) }
+    }
+}
+
+impl Backend for LinkHandler<'_> {
+    const PIECE: usize = CHUNK;
+
+    fn heard(&mut self) {
+        self.console.operator.seen(self.host, self.now);
+    }
+
+    fn connect(&mut self) -> CostUnit {
+        self.console.operator.connected(self.host, self.now);
+        CostUnit::Nothing
+    }
+
+    fn status(&mut self) -> Status {
+        // Before the first tick it is as at power-up.
+        let said = self.console.said.as_ref();
+        Status {
+            tick: said.map_or(0, |said| said.tick + 1),
+            phase: said.map_or(Phase::Disarmed, |said| said.phase).word() as u8,
+            cause: said.map_or(Cause::None, |said| said.cause).word() as u8,
+            finding: said.map_or(0, |said| said.finding.word() as u16),
+            amplifier_on: said.is_some_and(|said| said.on),
+            status: said.map_or(0, |said| said.status),
+            events: *self.events,
+            late: said.map_or(0, |said| u32::try_from(said.late).unwrap_or(u32::MAX)),
+            age: self.since(self.console.ticked),
+            link: Counters::NONE,
         }
-        match (self.take(), wanted) {
+    }
+
+    fn health(&mut self) -> Health {
+        Health { events: core::mem::take(self.events), ..self.console.health }
+    }
+
+    fn place(&mut self) -> (Status, Option<u64>, [u64; PLACE_WORDS]) {
+        (self.status(), self.since(self.console.measured), self.console.place)
+    }
+
+    fn buffer(&mut self) -> &mut [u8] {
+        &mut self.words
+    }
+
+    fn authorise(&mut self) -> Result<(), Refusal> {
+        // A host that sends commands faster than the loop takes them must not delay other hosts.
+        if self.console.is_full() { Err(Refusal::Busy) } else { self.take() }
+    }
+
+    /// A request that slows the machine down is accepted from every host.
+    fn supervise(&mut self, request: Wanted) -> Result<(), Refusal> {
+        match (self.take(), request) {
             (Ok(()), _) | (Err(Refusal::Busy), Wanted::Hold) | (Err(_), Wanted::RampDown) => {}
             (refused, _) => return refused,
         }
-        let stops = matches!(wanted, Wanted::Hold | Wanted::RampDown);
-        if stops {
+        if matches!(request, Wanted::Hold | Wanted::RampDown) {
             self.console.stop();
         }
-        self.console.operator.ask_by_link(wanted, self.host);
+        self.console.operator.ask_by_link(request, self.host);
         Ok(())
     }
 
-    fn command(&mut self, words: Bytes<'_>) -> Result<(), Refusal> {
-        // A wave or a pass makes the set-points: two sources would conflict.
-        if self.console.is_engaged() {
+    fn command(&mut self, command: &Command) -> Result<(), Refusal> {
+        // A wave or a pass makes the set-points: two sources would conflict. A command from before the run must not
+        // take effect later.
+        if self.console.is_engaged() || !self.console.runs() {
             return Err(Refusal::State);
         }
-        let mut command = [0; COMMAND_WORDS];
-        if !words.read_words(&mut command) {
-            return Err(Refusal::Length { expected: COMMAND_WORDS as u16 });
-        }
-        // A command from before the run must not take effect later.
-        if !self.console.runs() {
-            return Err(Refusal::State);
-        }
-        self.console.operator.set_by_link(command);
+        self.console.operator.set_by_link(*command);
         Ok(())
     }
 
-    fn configure(&mut self, words: Bytes<'_>) -> Result<(), Refusal> {
-        let mut config = [0; CONFIG_WORDS];
-        if !words.read_words(&mut config) {
-            return Err(Refusal::Length { expected: CONFIG_WORDS as u16 });
-        }
-        let config = Config::from_words(&config).map_err(|error| Refusal::Word { index: error.word as u16 })?;
-        self.console.configure(config);
-        Ok(())
+    fn command_on_edge(&mut self, command: &Command) -> Result<(), Refusal> {
+        self.console.command_on_edge(*command)
     }
 
-    fn command_on_edge(&mut self, words: Bytes<'_>) -> Result<(), Refusal> {
-        let mut command = [0; COMMAND_WORDS];
-        if !words.read_words(&mut command) {
-            return Err(Refusal::Length { expected: COMMAND_WORDS as u16 });
-        }
-        self.console.command_on_edge(command).map_err(refusal)
-    }
-
-    fn edge(&mut self, drop: bool) -> Reply<'static> {
+    fn edge(&mut self, drop: bool) -> Result<EdgeStatus, Refusal> {
         if drop {
-            let dropped = self.ordered(|handler| {
-                handler.console.stop_waiting();
-                Ok(())
-            });
-            if dropped != Reply::Done {
-                return dropped;
-            }
+            self.authorise()?;
+            self.console.stop_waiting();
         }
-        Reply::Edge(self.console.edge)
+        Ok(self.console.edge)
     }
 
-    fn wave(&mut self, action: WaveAction, words: Bytes<'_>) -> Result<(), Refusal> {
-        let on_edge = match action {
-            WaveAction::Start => false,
-            WaveAction::StartOnEdge if triggers::INPUT => true,
-            WaveAction::StartOnEdge => return Err(Refusal::Unsupported),
-            WaveAction::Stop => {
-                self.console.stop_wave();
-                return Ok(());
-            }
-        };
-        let mut settings = [0; wave::WORDS];
-        if !words.read_words(&mut settings) {
-            return Err(Refusal::Length { expected: wave::WORDS as u16 });
+    fn settings(&mut self) -> [u64; CONFIG_WORDS] {
+        self.console.config().to_words()
+    }
+
+    fn configure(&mut self, config: Config) {
+        self.console.configure(config);
+    }
+
+    fn recorder(&mut self, action: RecorderAction) -> Result<RecorderStatus, Refusal> {
+        if action != RecorderAction::Look {
+            self.admit()?;
         }
-        let settings = Settings::<Real>::from_words(&settings)
-            .map_err(|refused| refused.word().map_or(Refusal::State, |index| Refusal::Word { index: index as u16 }))?;
-        self.console.start_wave(&settings, on_edge).map_err(refusal)
-    }
-
-    fn knots(&mut self, first: u32, knots: Bytes<'_>) -> Result<(), Refusal> {
-        // Not [`Refusal::Message`]: the sequence number of an unreadable message is used again.
-        let whole = Refusal::Length { expected: (KNOTS * KNOT / size_of::<u64>()) as u16 };
-        let knots = knots.knots().ok_or(whole)?;
-        self.console.put_knots(first, knots).map_err(refusal)
-    }
-
-    fn pass(&mut self, action: PassAction) -> Reply<'static> {
-        if action != PassAction::Look {
-            let others = !self.console.operator.may_order(self.host, self.now) || self.console.is_full();
-            let done = match action {
-                _ if others => Err(Refusal::Busy),
-                PassAction::Learn { reach, fade } => self.take().and_then(|()| {
-                    let learns = self.console.passes.learn(learning::Settings { reach, fade });
-                    if learns { Ok(()) } else { Err(Refusal::State) }
-                }),
-                PassAction::Begin { spacing, before, ticks, trajectory } => self.take().and_then(|()| {
-                    self.console.begin_pass(Course { spacing, before, ticks, trajectory }).map_err(refusal)
-                }),
-                _ => {
-                    self.console.abort_pass();
-                    Ok(())
-                }
-            };
-            if let Err(refused) = done {
-                return Reply::Refused(refused);
-            }
-        }
-        self.console.passes.status().map_or(Reply::Refused(Refusal::Unsupported), Reply::Pass)
-    }
-
-    /// Knots of the last pass's error, or of the next one's correction.
-    fn fetched(&mut self, offset: u32, knots: impl Fn(&Passes) -> Option<&[Knot]>) -> Reply<'_> {
-        let Some(knots) = knots(&self.console.passes) else { return Reply::Refused(Refusal::State) };
-        let total = u32::try_from(knots.len() * KNOT).unwrap_or(u32::MAX);
-        let start = usize::try_from(offset).unwrap_or(usize::MAX);
-        let bytes = Bytes(put_knots(knots, start, &mut self.knots));
-        Reply::Chunk { offset, total, bytes }
-    }
-
-    fn recorder(&mut self, action: RecorderAction) -> Reply<'static> {
-        let others = !self.console.operator.may_order(self.host, self.now) || self.console.is_full();
-        let done = match action {
-            action if others && action != RecorderAction::Look => return Reply::Refused(Refusal::Busy),
-            RecorderAction::Look => Ok(()),
-            RecorderAction::Arm { after } => self.console.arm_recorder(after),
-            RecorderAction::Trigger => {
-                self.console.trigger_recorder();
-                Ok(())
-            }
-            RecorderAction::Stop => {
-                self.console.stop_recorder();
-                Ok(())
-            }
-        };
-        if let Err(no) = done {
-            return Reply::Refused(refusal(no));
+        match action {
+            RecorderAction::Look => {}
+            RecorderAction::Arm { after } => self.console.arm_recorder(after)?,
+            RecorderAction::Trigger => self.console.trigger_recorder(),
+            RecorderAction::Stop => self.console.stop_recorder(),
         }
         let standing = self.console.capture.standing();
-        Reply::Recorder(RecorderStatus {
+        Ok(RecorderStatus {
             running: standing.running,
             triggered: standing.triggered,
             ticks: u32::try_from(standing.ticks).unwrap_or(u32::MAX),
             capacity: CAPACITY,
         })
     }
-}
 
-fn refusal(no: Rejection) -> Refusal {
-    match no {
-        Rejection::State => Refusal::State,
-        Rejection::Word(index) => Refusal::Word { index: index as u16 },
+    fn download(&mut self, offset: u32) -> Result<Reply<'_>, Refusal> {
+        self.console.capture.image().map(|image| piece(image, offset, CHUNK)).ok_or(Refusal::State)
     }
-}
 
-fn piece(whole: &[u8], offset: u32) -> Reply<'_> {
-    let start = usize::try_from(offset).unwrap_or(usize::MAX);
-    let rest = whole.get(start..).unwrap_or_default();
-    let piece = rest.get(..CHUNK).unwrap_or(rest);
-    Reply::Chunk { offset, total: u32::try_from(whole.len()).unwrap_or(u32::MAX), bytes: Bytes(piece) }
+    fn start_wave(&mut self, settings: &Settings<Real>, on_edge: bool) -> Result<(), Refusal> {
+        self.console.start_wave(settings, on_edge)
+    }
+
+    fn stop_wave(&mut self) -> Result<(), Refusal> {
+        self.console.stop_wave();
+        Ok(())
+    }
+
+    fn put_knots(&mut self, first: u32, knots: &[Knot]) -> Result<(), Refusal> {
+        self.console.put_knots(first, knots)
+    }
+
+    fn pass(&mut self, action: PassAction) -> Result<PassStatus, Refusal> {
+        if action != PassAction::Look {
+            self.admit()?;
+        }
+        match action {
+            PassAction::Look => {}
+            PassAction::Begin { spacing, before, ticks, trajectory } => {
+                self.take()?;
+                self.console.begin_pass(Course { spacing, before, ticks, trajectory })?;
+            }
+            PassAction::Abort => self.console.abort_pass(),
+            PassAction::Learn { reach, fade } => {
+                self.take()?;
+                if !self.console.passes.learn(learning::Settings { reach, fade }) {
+                    return Err(Refusal::State);
+                }
+            }
+        }
+        self.console.passes.status().ok_or(Refusal::Unsupported)
+    }
+
+    fn knots(
+        &mut self,
+        offset: u32,
+        knots: impl for<'p> Fn(&'p Player<'static, Real>) -> &'p [Knot],
+    ) -> Result<Reply<'_>, Refusal> {
+        let knots = knots(self.console.passes.player().ok_or(Refusal::State)?);
+        let total = u32::try_from(knots.len() * KNOT).unwrap_or(u32::MAX);
+        let start = usize::try_from(offset).unwrap_or(usize::MAX);
+        Ok(Reply::Chunk { offset, total, bytes: Bytes(put_knots(knots, start, &mut self.knots)) })
+    }
+
+    fn stream(&mut self, every: u32) -> Result<(), Refusal> {
+        self.stream.start(every)
+    }
+
+    fn samples(&mut self) -> Reply<'_> {
+        self.stream.take()
+    }
+
+    /// The machine of a PC runs on the host itself: `specgen sim` and `specgen replay` test it without lock-steps.
+    fn other(&mut self, request: &Request<'_>) -> Reply<'_> {
+        if *request != Request::Stop {
+            return Reply::Refused(Refusal::Unsupported);
+        }
+        self.console.operator.ramp_down(self.now);
+        Reply::Done
+    }
 }
 
 impl Device for LinkHandler<'_> {
     fn execute(&mut self, request: &Request<'_>) -> Reply<'_> {
-        self.console.operator.seen(self.host, self.now);
-        match *request {
-            Request::Hello => {
-                self.console.operator.connected(self.host, self.now);
-                Reply::Identity(Identity {
-                    config_words: CONFIG_WORDS as u16,
-                    input_words: MACHINE_INPUT_WORDS as u16,
-                    output_words: MACHINE_OUTPUT_WORDS as u16,
-                    stages: 0,
-                    counted: CostUnit::Nothing,
-                    description: DESCRIPTION.len() as u32,
-                })
-            }
-            Request::Describe { offset } => piece(DESCRIPTION.as_bytes(), offset),
-            Request::Status => self.status(),
-            Request::Health => self.health(),
-            Request::Place => self.place(),
-            Request::Supervise { request } => self.supervise(request).map_or_else(Reply::Refused, |()| Reply::Done),
-            Request::Setpoint { words } => self.ordered(|handler| handler.command(words)),
-            Request::SetpointOnEdge { .. } | Request::Edge { .. } if !triggers::INPUT => {
-                Reply::Refused(Refusal::Unsupported)
-            }
-            Request::SetpointOnEdge { words } => self.ordered(|handler| handler.command_on_edge(words)),
-            Request::Edge { drop } => self.edge(drop),
-            Request::ReadConfig => match put_words(&self.console.config().to_words(), &mut self.words) {
-                Some(words) => Reply::Config { words },
-                None => Reply::Refused(Refusal::TooLong),
-            },
-            Request::WriteConfig { words } => self.ordered(|handler| handler.configure(words)),
-            Request::Recorder { action } => self.recorder(action),
-            Request::Download { offset } => match self.console.capture.image() {
-                Some(image) => piece(image, offset),
-                None => Reply::Refused(Refusal::State),
-            },
-            Request::Wave { action, words } => self.ordered(|handler| handler.wave(action, words)),
-            Request::Knots { .. } | Request::Pass { .. } | Request::Errors { .. } | Request::Correction { .. }
-                if !passes::POSSIBLE =>
-            {
-                Reply::Refused(Refusal::Unsupported)
-            }
-            Request::Knots { first, knots } => self.ordered(|handler| handler.knots(first, knots)),
-            Request::Pass { action } => self.pass(action),
-            Request::Errors { offset } => self.fetched(offset, Passes::errors),
-            Request::Correction { offset } => self.fetched(offset, Passes::correction),
-            Request::Stream { every } => self.stream.start(every).map_or_else(Reply::Refused, |()| Reply::Done),
-            Request::Samples => self.stream.take(),
-            Request::Stop => {
-                self.console.operator.ramp_down(self.now);
-                Reply::Done
-            }
-            // The machine of a PC runs on the host itself: `specgen sim` and `specgen replay` test it.
-            Request::LockstepReset { .. } | Request::LockstepStep { .. } | Request::LockstepStage { .. } => {
-                Reply::Refused(Refusal::Unsupported)
-            }
-        }
+        execute(self, request)
     }
 }
 
@@ -340,7 +263,11 @@ mod tests {
     use crate::capture::Capture;
     use crate::handover::LoopCommand;
     use crate::operator::{Operator, Timeout};
-    use controller::CONFIG_NAMES;
+    use crate::passes::Passes;
+    use controller::supervised::MACHINE_INPUT_WORDS;
+    use controller::{COMMAND_WORDS, CONFIG_NAMES, DESCRIPTION};
+    use specgen_link::WaveAction;
+    use specgen_runtime::wave;
 
     const A: HostId = HostId(1);
     const B: HostId = HostId(2);
@@ -476,7 +403,7 @@ mod tests {
         assert_eq!(ask(&mut console, &setpoint), DONE);
         assert_eq!(console.operator.wish().unwrap().command, Some([3; COMMAND_WORDS]));
         // A wave commands in its place.
-        assert_eq!(console.start_wave(&Settings::still(), false), Err(Rejection::State), "under a trajectory");
+        assert_eq!(console.start_wave(&Settings::still(), false), Err(Refusal::State), "under a trajectory");
         console.operator.set_by_link([0; COMMAND_WORDS]);
         console.start_wave(&Settings::still(), false).unwrap();
         assert_eq!(ask(&mut console, &setpoint), refused(Refusal::State));
@@ -599,20 +526,18 @@ mod tests {
         let mut console = console(Phase::Running);
         console.operator.wish();
         let (mut events, mut stream) = (0, Stream::default());
-        let words = bytes(&[1; COMMAND_WORDS]);
+        let command = [1; COMMAND_WORDS];
         let mut handler = LinkHandler::new(&mut console, A, false, &mut events, &mut stream, NOW);
-        let expected = COMMAND_WORDS as u16;
-        assert_eq!(handler.command_on_edge(Bytes(&words[8..])), Err(Refusal::Length { expected }));
-        assert_eq!(handler.command_on_edge(Bytes(&words)), Ok(()));
-        assert!(matches!(handler.edge(false), Reply::Edge(_)));
+        assert_eq!(handler.command_on_edge(&command), Ok(()));
+        assert!(handler.edge(false).is_ok());
         assert_eq!(handler.console.outgoing().0.len(), 1);
-        assert!(matches!(handler.edge(true), Reply::Edge(_)));
+        assert!(handler.edge(true).is_ok());
         assert!(matches!(handler.console.outgoing().0.back(), Some(LoopCommand::StopWaiting)));
         handler.is_late = true;
-        assert_eq!(handler.edge(true), Reply::Refused(Refusal::Busy));
+        assert_eq!(handler.edge(true), Err(Refusal::Busy));
         let mut resting = self::console(Phase::Holding);
         let mut handler = LinkHandler::new(&mut resting, A, false, &mut events, &mut stream, NOW);
-        assert_eq!(handler.command_on_edge(Bytes(&words)), Err(Refusal::State));
+        assert_eq!(handler.command_on_edge(&command), Err(Refusal::State));
     }
 
     #[test]
@@ -621,29 +546,28 @@ mod tests {
         console.passes = Passes::with(8);
         let (mut events, mut stream) = (0, Stream::default());
         let mut handler = LinkHandler::new(&mut console, A, false, &mut events, &mut stream, NOW);
-        let whole = (KNOTS * KNOT / size_of::<u64>()) as u16;
+        let knots = [[1, 2, 3, 4, 5, 6], [7, 8, 9, 10, 11, 12]];
+        assert_eq!(handler.put_knots(0, &knots), Ok(()));
+        assert_eq!(handler.put_knots(4, &knots), Err(Refusal::Word { index: 0 }));
         let knots: Vec<u8> = (1..=12_i32).flat_map(i32::to_le_bytes).collect();
-        assert_eq!(handler.knots(0, Bytes(&knots[1..])), Err(Refusal::Length { expected: whole }));
-        assert_eq!(handler.knots(0, Bytes(&knots)), Ok(()));
-        assert_eq!(handler.knots(4, Bytes(&knots)), Err(Refusal::Word { index: 0 }));
         // Of a course of one knot, as long as there was no other.
         for (offset, piece) in [(0, &knots[..KNOT]), (KNOT, &[])] {
             let piece = Reply::Chunk { offset: offset as u32, total: KNOT as u32, bytes: Bytes(piece) };
-            assert_eq!(handler.fetched(offset as u32, Passes::correction), piece);
+            assert_eq!(handler.knots(offset as u32, Player::correction), Ok(piece));
         }
         // This controller has no correction: what is done otherwise ends with that.
-        let done = Reply::Refused(Refusal::Unsupported);
+        let done = Err(Refusal::Unsupported);
         assert_eq!(handler.pass(PassAction::Look), done);
         assert_eq!(handler.pass(PassAction::Abort), done);
         assert!(matches!(handler.console.outgoing().0.back(), Some(LoopCommand::AbortPass)));
-        assert_eq!(handler.pass(PassAction::Learn { reach: 1, fade: [0, 0] }), Reply::Refused(Refusal::State));
+        assert_eq!(handler.pass(PassAction::Learn { reach: 1, fade: [0, 0] }), Err(Refusal::State));
         let begin = PassAction::Begin { spacing: 1, before: 0, ticks: 2, trajectory: 0 };
-        assert_eq!(handler.pass(begin), Reply::Refused(Refusal::State));
+        assert_eq!(handler.pass(begin), Err(Refusal::State));
         handler.host = B;
-        assert_eq!(handler.pass(PassAction::Abort), Reply::Refused(Refusal::Busy));
+        assert_eq!(handler.pass(PassAction::Abort), Err(Refusal::Busy));
         assert_eq!(handler.pass(PassAction::Look), done);
         let mut away = self::console(Phase::Running);
         let mut handler = LinkHandler::new(&mut away, A, false, &mut events, &mut stream, NOW);
-        assert_eq!(handler.fetched(0, Passes::errors), Reply::Refused(Refusal::State));
+        assert_eq!(handler.knots(0, Player::errors), Err(Refusal::State));
     }
 }

@@ -69,7 +69,7 @@ impl Device for Every<'_> {
         match *request {
             Request::Status => Reply::Status(*self.1),
             Request::ReadConfig => Reply::Config { words: Bytes(self.2) },
-            Request::Download { offset } => specgen_link::lockstep::piece(self.2, offset),
+            Request::Download { offset } => specgen_link::lockstep::piece(self.2, offset, 512),
             Request::Supervise { request } => {
                 self.0 = request;
                 Reply::Done
