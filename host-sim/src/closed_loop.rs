@@ -11,7 +11,7 @@ use crate::controller::{ControllerError, TickController};
 use crate::coverage::Coverage;
 use crate::description::DescriptionError;
 use crate::noise::{Gauge, Gaussian, amplifier};
-use crate::plant::{LegParameters, NoiseParameters, Plant};
+use crate::plant::{LegParameters, LegPlant, NoiseParameters};
 use crate::trace::Trace;
 use crate::trajectory::LegTrajectory;
 use crate::word::status_words;
@@ -24,16 +24,16 @@ const LONGEST_INTERVAL: f64 = 60.0;
 
 /// One leg with its amplifier and gauge.
 #[derive(Debug, Clone)]
-struct Channel<P> {
-    leg: P,
+struct Channel {
+    leg: LegPlant,
     gauge: Gauge,
     amplifier: Gaussian,
 }
 
 /// Six legs with gauges and amplifiers.
 #[derive(Debug, Clone)]
-pub struct Rig<P> {
-    channels: [Channel<P>; LEGS],
+pub struct Rig {
+    channels: [Channel; LEGS],
     latency: usize,
     /// Voltage of zero drive, at which the legs rest, V.
     lowest: f64,
@@ -248,10 +248,10 @@ impl Run {
     }
 }
 
-impl<P: Plant + Clone + PartialEq> Rig<P> {
+impl Rig {
     /// Legs as built, each with its own noise stream from one seed.
     #[must_use]
-    pub fn new(legs: [P; LEGS], noise: &NoiseParameters, seed: u64) -> Self {
+    pub fn new(legs: [LegPlant; LEGS], noise: &NoiseParameters, seed: u64) -> Self {
         let mut index = 0;
         let channels = legs.map(|leg| {
             let channel =
@@ -444,20 +444,20 @@ mod tests {
     use crate::description::tests::six_legs;
     use crate::word::Scalar;
 
-    /// A leg of 1 µm/V, without delay.
-    #[derive(Clone, Default, PartialEq)]
-    struct Spring {
-        drive: f64,
-    }
-
-    impl Plant for Spring {
-        fn hold(&mut self, drive: f64, _interval: f64) -> f64 {
-            self.drive = drive;
-            self.displacement()
-        }
-        fn displacement(&self) -> f64 {
-            5e-6 + self.drive * 1e-6
-        }
+    /// A leg of 1 µm/V that has settled after a tick.
+    fn spring() -> LegPlant {
+        LegPlant::new(&LegParameters {
+            gain_um_per_v: 1.0,
+            s2: 0.0,
+            play_thresholds_v: vec![0.0],
+            play_weights: vec![1.0],
+            creep_weights: vec![0.0; 5],
+            tau_amp_s: 0.0,
+            fn_hz: 1e6,
+            zeta: 0.9,
+            step_s: 1e-3,
+            ..LegParameters::reference()
+        })
     }
 
     /// Rises by 1 µm per s per leg number.
@@ -472,8 +472,8 @@ mod tests {
         }
     }
 
-    fn rig() -> Rig<Spring> {
-        let mut rig = Rig::new(std::array::from_fn(|_| Spring::default()), &NoiseParameters::NONE, 1);
+    fn rig() -> Rig {
+        let mut rig = Rig::new(std::array::from_fn(|_| spring()), &NoiseParameters::NONE, 1);
         rig.prepare(&Preparation { peak: 100.0, rate: 20.0, settle: 0.7, update: 1e-2, rest: 0.0 });
         rig
     }
@@ -532,7 +532,7 @@ mod tests {
     fn noise_repeats_with_its_seed() {
         let noise = NoiseParameters { sensor_nm_rms: 2.0, adc_lsb_nm: 0.76, dac_lsb_mv: 0.0, amplifier_mv_rms: 2.0 };
         let run = |seed| {
-            let mut rig = Rig::new(std::array::from_fn(|_| Spring::default()), &noise, seed);
+            let mut rig = Rig::new(std::array::from_fn(|_| spring()), &noise, seed);
             rig.run(&mut follower(1e6), &Slope, 0.1).unwrap().trace
         };
         assert_eq!(run(3), run(3));

@@ -6,7 +6,7 @@
 use std::fmt::Write;
 
 use crate::noise::Gauge;
-use crate::plant::{Plant, steps_within};
+use crate::plant::{LegPlant, steps_within};
 
 /// The comment that marks a record as simulated. `specgen_identify::SIMULATED` is equal; a test compares them.
 pub const SIMULATED: &str = "# simulated by specgen: no leg was measured";
@@ -70,7 +70,7 @@ impl ReversalExperiment {
     ///
     /// The reference figures are for a leg as built: a saturating pre-cycle before the curves leaves creep in them and
     /// raises the Invhys error at 0.1 Hz from 127 to 138 nm.
-    pub fn run<P: Plant>(&self, leg: &mut P, gauge: &mut Gauge) -> ReversalRecord {
+    pub fn run(&self, leg: &mut LegPlant, gauge: &mut Gauge) -> ReversalRecord {
         let rows = self.rows_per_interval.max(1);
         let levels = f64::from(self.intervals) * f64::from(rows);
         // A single division, so that a grid node has the same bits for any number of rows between.
@@ -147,7 +147,7 @@ pub fn trimmed(value: f64, digits: usize) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::plant::{LegParameters, LegPlant, NoiseParameters};
+    use crate::plant::{LegParameters, NoiseParameters};
 
     fn record(experiment: &ReversalExperiment, noise: &NoiseParameters) -> ReversalRecord {
         let mut leg = LegPlant::new(&LegParameters::reference());

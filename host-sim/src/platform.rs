@@ -10,13 +10,13 @@
 
 #![allow(clippy::needless_range_loop, reason = "matrices are indexed as in their formulae")]
 
-mod amplifier;
 mod contact;
 mod frames;
 mod gauge;
 mod geometry;
 mod inertia;
 mod linear;
+mod long_step;
 mod parameters;
 mod plant;
 pub mod rig;
@@ -26,9 +26,7 @@ mod specimen;
 mod structure;
 pub mod study;
 pub mod table;
-mod whole_tick;
 
-pub use amplifier::Amplifier;
 pub use contact::{Contact, WorkPart, Wrench};
 pub use frames::UserFrames;
 pub use gauge::{GaugeSignal, Probe};

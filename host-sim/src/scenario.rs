@@ -21,7 +21,7 @@ const SETPOINT_LEG: f64 = 1.0;
 /// Six legs, prepared once; every run starts from the same state.
 #[derive(Debug, Clone)]
 pub struct LegScenario {
-    prepared: Rig<LegPlant>,
+    prepared: Rig,
     samples_per_period: u32,
 }
 
@@ -53,12 +53,12 @@ impl LegScenario {
 
     /// The prepared rig.
     #[must_use]
-    pub fn rig(&self) -> &Rig<LegPlant> {
+    pub fn rig(&self) -> &Rig {
         &self.prepared
     }
 
     /// The prepared rig, to change it for all runs.
-    pub fn rig_mut(&mut self) -> &mut Rig<LegPlant> {
+    pub fn rig_mut(&mut self) -> &mut Rig {
         &mut self.prepared
     }
 

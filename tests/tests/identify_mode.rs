@@ -3,7 +3,7 @@
 
 use crate::identify_support::{generator, normal};
 use core::f64::consts::TAU;
-use host_sim::plant::{LegParameters, LegPlant, Plant};
+use host_sim::plant::{LegParameters, LegPlant};
 use specgen::identify::mode::ring;
 use specgen::identify::rate::{RateModel, RateOption, identify_rate};
 use specgen::identify::{Drive, Options, PredictionError, Record, Source, predict};

@@ -8,7 +8,6 @@
 mod serve;
 
 use host_sim::closed_loop::Rig;
-use host_sim::plant::LegPlant;
 use host_sim::platform::PlatformRig;
 use specgen_rt::exchange::{Actuation, CHANNELS, Sensing};
 use specgen_runtime::supervisor::{Finding, with};
@@ -37,7 +36,7 @@ pub enum Plant {
     /// A platform measured by six gauges.
     Platform(Box<PlatformRig>),
     /// Six legs, each with its own gauge.
-    Legs(Box<Rig<LegPlant>>),
+    Legs(Box<Rig>),
 }
 
 impl Plant {

@@ -4,7 +4,7 @@ use core::f64::consts::TAU;
 
 use host_sim::closed_loop::RunError;
 use host_sim::controller::{Controller, TickController};
-use host_sim::plant::{LegParameters, LegPlant, Plant};
+use host_sim::plant::{LegParameters, LegPlant};
 use host_sim::platform::PlatformScenario;
 use host_sim::platform::rig::{PlatformRun, Record, RunOptions};
 use host_sim::platform::scenario::select;

@@ -1,39 +1,6 @@
-//! Linear parts of a leg, discretised exactly for a held input.
+//! Linear parts of a leg, discretised exactly.
 
-/// First-order lag τ ẏ = u − y.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Lag {
-    time_constant: f64,
-    decay: f64,
-    /// Output now.
-    pub(super) output: f64,
-}
-
-impl Lag {
-    /// `time_constant` τ in s; 0 passes the input through.
-    #[must_use]
-    pub fn new(time_constant: f64) -> Self {
-        Self { time_constant, decay: 0.0, output: 0.0 }
-    }
-
-    /// Sets the length of the following steps, s.
-    pub fn set_step(&mut self, step: f64) {
-        self.decay = self.decay_over(step);
-    }
-
-    /// e^(−step/τ).
-    pub(super) fn decay_over(&self, step: f64) -> f64 {
-        if self.time_constant > 0.0 { libm::exp(-step / self.time_constant) } else { 0.0 }
-    }
-
-    /// Holds `input` for one step.
-    pub fn advance(&mut self, input: f64) -> f64 {
-        self.output = input + (self.output - input) * self.decay;
-        self.output
-    }
-}
-
-/// The same lag with a smooth input whose rate is known: τ ẏ = u − y.
+/// First-order lag with a smooth input whose rate is known: τ ẏ = u − y.
 ///
 /// Exact for an input that is a cubic over a step, given by its values and rates at both ends. For an oscillation at ω
 /// the error is at most (ω step)⁴/384 of its amplitude.
@@ -137,44 +104,25 @@ impl Resonance {
         ];
     }
 
-    /// Present position, in the unit of the input.
+    /// Present position, in the unit of the input, and its rate, per s.
     #[must_use]
-    pub fn position(&self) -> f64 {
-        self.position
+    pub fn motion(&self) -> [f64; 2] {
+        [self.position, self.velocity]
     }
 
-    /// Its rate, per s.
-    #[must_use]
-    pub fn velocity(&self) -> f64 {
-        self.velocity
-    }
-
-    /// Holds `input` for one step; returns the position at its end.
-    pub fn advance(&mut self, input: f64) -> f64 {
+    /// Holds `input` for one step.
+    pub fn advance(&mut self, input: f64) {
         let [[a, b], [c, d]] = self.transition;
         let offset = self.position - input;
         let velocity = self.velocity;
         self.position = input + (a * offset + b * velocity);
         self.velocity = c * offset + d * velocity;
-        self.position
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn a_lag_reaches_63_percent_in_one_time_constant_whatever_the_step() {
-        for steps in [1, 7, 1000] {
-            let mut lag = Lag::new(0.35e-3);
-            lag.set_step(0.35e-3 / f64::from(steps));
-            for _ in 0..steps {
-                lag.advance(1.0);
-            }
-            assert!((lag.output - (1.0 - libm::exp(-1.0))).abs() < 1e-12);
-        }
-    }
 
     #[test]
     fn a_smooth_lag_follows_an_oscillation_as_the_closed_form_says_whatever_the_step() {
@@ -226,7 +174,7 @@ mod tests {
             for _ in 0..steps {
                 resonance.advance(1.0);
             }
-            assert!((resonance.position() - expected).abs() < 1e-10, "{steps}: {}", resonance.position());
+            assert!((resonance.position - expected).abs() < 1e-10, "{steps}: {}", resonance.position);
         }
     }
 
@@ -237,6 +185,6 @@ mod tests {
         for _ in 0..20_000 {
             resonance.advance(3.0);
         }
-        assert!((resonance.position() - 3.0).abs() < 1e-12);
+        assert!((resonance.position - 3.0).abs() < 1e-12);
     }
 }

@@ -3,8 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::geometry::{angles, rotation};
-use super::linear::{Matrix3, Six, Three, apply, dot};
-use crate::plant::lanes::{LANES, Lane};
+use super::linear::{LANES, Lane, Matrix3, Six, Three, apply, dot};
 
 /// A gauge fixed to the base that measures along its line to a plane on the platform.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]

@@ -12,6 +12,17 @@ pub type Three = [f64; 3];
 /// Rows of a 3×3 matrix.
 pub type Matrix3 = [[f64; 3]; 3];
 
+/// Lanes: six legs, and two idle ones, to fill vector registers.
+pub(crate) const LANES: usize = 8;
+
+/// A number of each leg.
+pub(crate) type Lane = [f64; LANES];
+
+/// A number of each leg, and 0 in the idle lanes.
+pub(crate) fn lanes_of(&[a, b, c, d, e, f]: &Six) -> Lane {
+    [a, b, c, d, e, f, 0.0, 0.0]
+}
+
 /// `a` × `b`.
 pub(crate) fn cross(a: Three, b: Three) -> Three {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]

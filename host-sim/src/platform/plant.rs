@@ -1,64 +1,35 @@
 //! The whole plant: six amplifiers and stacks that drive the structure.
 
-use super::amplifier::Amplifier;
 use super::contact::{WorkPart, Wrench};
-use super::linear::Six;
+use super::linear::{LANES, Lane, Six, lanes_of};
+use super::long_step;
 use super::specimen::Specimen;
-use super::structure::Structure;
-use super::whole_tick::WholeTick;
+use super::structure::{Structure, StructureLanes};
 use crate::closed_loop::Preparation;
-use crate::plant::{SmoothLag, Stack, steps_within};
+use crate::plant::{Actuators, SmoothLag, steps_within};
 
 /// Ratio of long steps to the longest small one, and to that of the pre-cycle.
 const LONG: f64 = 5.0;
-
-/// Amplifier and stacks of one leg.
-#[derive(Debug, Clone, PartialEq)]
-struct Actuator {
-    amplifier: Amplifier,
-    stack: Stack,
-    /// Free displacement now and at rest, µm.
-    displacement: f64,
-    rest: f64,
-    /// V.
-    peak: f64,
-}
-
-impl Actuator {
-    fn set_step(&mut self, step: f64) {
-        self.amplifier.set_step(step);
-        self.stack.set_step(step);
-    }
-
-    /// Holds `voltage` for one step, the `first` of an interval or a later one.
-    fn advance(&mut self, voltage: f64, first: bool) {
-        let before = self.amplifier.voltage;
-        let after = self.amplifier.advance(voltage);
-        self.displacement =
-            if first { self.stack.advance(before, after) } else { self.stack.advance_on(before, after) };
-    }
-
-    /// Free displacement from rest, m.
-    fn free_displacement(&self) -> f64 {
-        (self.displacement - self.rest) * 1e-6
-    }
-}
 
 /// A platform with six held voltages as inputs.
 ///
 /// Poses count from rest without drive after the pre-cycle of [`PlatformPlant::prepare`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct PlatformPlant {
-    actuators: [Actuator; 6],
+    actuators: Actuators<LANES>,
+    /// Full drive of each leg, V.
+    peaks: Six,
+    /// Free displacements at rest, µm, and those since rest, m.
+    rest: Lane,
+    displacement: Lane,
     structure: Structure,
     /// Lag of the gauges for each coordinate of the pose; none: no lag.
     gauges: Option<[SmoothLag; 6]>,
     longest_step: f64,
-    step: f64,
-    /// Whether long steps are requested, see [`PlatformPlant::step_whole_ticks`]; and their state, in place of
-    /// actuators and structure, while in use.
+    /// Whether long steps are requested, see [`PlatformPlant::step_whole_ticks`]; and the structure of long steps, in
+    /// place of the other, while in use.
     long_steps: bool,
-    whole_tick: Option<Box<WholeTick>>,
+    long: Option<Box<StructureLanes>>,
 }
 
 impl PlatformPlant {
@@ -66,25 +37,17 @@ impl PlatformPlant {
     #[must_use]
     pub fn new(specimen: &Specimen) -> Self {
         let nominal = &specimen.nominal;
-        let slew = nominal.amplifier_current_a / nominal.stack_capacitance_f;
-        let actuators = specimen.legs.each_ref().map(|leg| Actuator {
-            amplifier: Amplifier::new(leg.tau_amp_s, slew),
-            stack: Stack::new(leg),
-            displacement: 0.0,
-            rest: 0.0,
-            peak: leg.u_max,
-        });
-        let structure = Structure::new(specimen.structure(), nominal.step_s);
         let lag = specimen.legs[0].gauge_lag_s;
-        let gauges = (lag > 0.0).then(|| std::array::from_fn(|_| SmoothLag::new(lag)));
         Self {
-            actuators,
-            structure,
-            gauges,
+            actuators: Actuators::new(&specimen.legs, nominal.amplifier_current_a / nominal.stack_capacitance_f),
+            peaks: specimen.legs.each_ref().map(|leg| leg.u_max),
+            rest: [0.0; LANES],
+            displacement: [0.0; LANES],
+            structure: Structure::new(specimen.structure(), nominal.step_s),
+            gauges: (lag > 0.0).then(|| std::array::from_fn(|_| SmoothLag::new(lag))),
             longest_step: nominal.step_s,
-            step: 0.0,
             long_steps: false,
-            whole_tick: None,
+            long: None,
         }
     }
 
@@ -98,9 +61,8 @@ impl PlatformPlant {
     /// stays within 0.02 nm of that of the finest small steps, while small steps of 20 µs are off by 0.13 nm. With
     /// amplifiers faster than a step it stays within 0.3 nm, and at their current limit within 1 nm.
     ///
-    /// Small steps remain in use for a contact that may open, for a disturbance, and for legs that differ in the number
-    /// of their operators or the class of their hysteresis. `interval` (s) is that of the following holds; others are
-    /// possible.
+    /// Small steps remain in use for a contact that may open, and for a disturbance. `interval` (s) is that of the
+    /// following holds; others are possible.
     pub fn step_whole_ticks(&mut self, interval: f64) {
         self.long_steps = true;
         self.lengthen(interval / f64::from(steps_within(interval, LONG * self.longest_step)));
@@ -115,20 +77,17 @@ impl PlatformPlant {
     /// Starts long steps of `step` (s) if possible.
     fn lengthen(&mut self, step: f64) {
         self.shorten();
-        let amplifiers = self.actuators.each_ref().map(|actuator| &actuator.amplifier);
-        let stacks = self.actuators.each_ref().map(|actuator| &actuator.stack);
-        let rest = self.actuators.each_ref().map(|actuator| actuator.rest);
-        self.whole_tick = WholeTick::of(&amplifiers, &stacks, &rest, &self.structure, step).map(Box::new);
+        self.long = StructureLanes::of(&self.structure, step, self.actuators.lags()).map(Box::new);
+        if self.long.is_some() {
+            self.actuators.set_long_step(step);
+        }
     }
 
     /// Copies the state of long steps back.
     fn shorten(&mut self) {
-        let Some(whole) = self.whole_tick.take() else { return };
-        for (leg, actuator) in self.actuators.iter_mut().enumerate() {
-            whole.put_leg(leg, &mut actuator.amplifier, &mut actuator.stack);
-            actuator.displacement = whole.leg(leg).0;
+        if let Some(long) = self.long.take() {
+            long.put(&mut self.structure);
         }
-        whole.put_structure(&mut self.structure);
     }
 
     /// Pre-cycle of all free legs at once, and rest. Then the platform rests at the pose from which poses count, and
@@ -139,13 +98,8 @@ impl PlatformPlant {
         let Preparation { rate, settle, update, rest, .. } = *preparation;
         self.shorten();
         self.structure.release();
-        if !self.cycle_long(&Preparation { update: LONG * update, ..*preparation }) {
-            self.cycle_small(preparation);
-        }
-        for actuator in &mut self.actuators {
-            actuator.rest = actuator.displacement;
-        }
-        self.step = 0.0;
+        self.cycle(preparation);
+        self.displacement = [0.0; LANES];
         self.structure.set_state(&[0.0; 6], &[0.0; 6], &[0.0; 6]);
         self.gauges.iter_mut().flatten().for_each(|gauge| gauge.rest_at(0.0));
         if rest > 0.0 {
@@ -159,49 +113,29 @@ impl PlatformPlant {
         }
     }
 
-    /// Pre-cycle and rest of the legs, one by one in small steps.
-    fn cycle_small(&mut self, &Preparation { peak, rate, settle, update, .. }: &Preparation) {
-        for actuator in &mut self.actuators {
-            let peak = if peak < actuator.peak { peak } else { actuator.peak };
-            let steps = steps_within(peak / rate, update);
-            actuator.set_step(peak / rate / f64::from(steps));
-            for step in (1..=steps).chain((0..steps).rev()) {
-                actuator.advance(peak * f64::from(step) / f64::from(steps), true);
-            }
-            if settle > 0.0 {
-                let steps = steps_within(settle, update);
-                actuator.set_step(settle / f64::from(steps));
-                for _ in 0..steps {
-                    actuator.advance(0.0, true);
-                }
-            }
-        }
-    }
-
-    /// The same for all legs at once in long steps, if possible and if the peaks are equal; returns whether it was
-    /// done. A ramp is monotonic, and the final rest hides how it was reached: free displacements are equal within 0.01
-    /// nm.
-    fn cycle_long(&mut self, &Preparation { peak, rate, settle, update, .. }: &Preparation) -> bool {
-        let own = self.actuators[0].peak;
-        if self.actuators.iter().any(|actuator| actuator.peak != own) {
-            return false;
-        }
-        let peak = if peak < own { peak } else { own };
-        let ramp = steps_within(peak / rate, update);
-        self.lengthen(peak / rate / f64::from(ramp));
-        let Some(whole) = &mut self.whole_tick else { return false };
+    /// Pre-cycle and rest of the legs in long steps. A ramp is monotonic, and the final rest hides how it was reached:
+    /// free displacements are those of small steps within 0.01 nm.
+    fn cycle(&mut self, &Preparation { peak, rate, settle, update, .. }: &Preparation) {
+        let peaks = lanes_of(&self.peaks.map(|own| if peak < own { peak } else { own }));
+        let highest = peaks.into_iter().fold(0.0, |highest, peak| if peak > highest { peak } else { highest });
+        let ramp = steps_within(highest / rate, LONG * update);
+        self.actuators.set_long_step(highest / rate / f64::from(ramp));
+        let mut free = self.rest;
         for step in (1..=ramp).chain((0..ramp).rev()) {
-            whole.advance(&[peak * f64::from(step) / f64::from(ramp); 6]);
+            let voltages = peaks.map(|peak| peak * f64::from(step) / f64::from(ramp));
+            free = self.actuators.advance_long(&voltages).end;
         }
         if settle > 0.0 {
-            let steps = steps_within(settle, update);
-            self.lengthen(settle / f64::from(steps));
+            let steps = steps_within(settle, LONG * update);
+            self.actuators.set_long_step(settle / f64::from(steps));
             for _ in 0..steps {
-                self.whole_tick.iter_mut().for_each(|whole| whole.advance(&[0.0; 6]));
+                free = self.actuators.advance_long(&[0.0; LANES]).end;
             }
         }
-        self.shorten();
-        true
+        for (rest, free) in self.rest.iter_mut().zip(free) {
+            // To m and back, as the structure takes it: all bits of a run depend on this rounding.
+            *rest += (free - *rest) * 1e-6 * 1e6;
+        }
     }
 
     /// Holds six voltages (V, at the amplifier inputs) for `interval` (s, > 0).
@@ -209,29 +143,27 @@ impl PlatformPlant {
         if self.long_steps {
             let steps = steps_within(interval, LONG * self.longest_step);
             let step = interval / f64::from(steps);
-            if self.whole_tick.as_ref().is_none_or(|whole| whole.step().to_bits() != step.to_bits()) {
+            if self.long.is_none() || self.actuators.step().to_bits() != step.to_bits() {
                 self.lengthen(step);
             }
-            if let Some(whole) = &mut self.whole_tick {
-                return hold_long(whole, &mut self.gauges, voltages, steps);
+            if let Some(structure) = &mut self.long {
+                for _ in 0..steps {
+                    let before = [structure.pose(), structure.rate()];
+                    self.displacement = long_step::advance(&mut self.actuators, structure, &self.rest, voltages);
+                    gauges_follow(&mut self.gauges, &before, &[structure.pose(), structure.rate()], step);
+                }
+                return;
             }
         }
         let steps = steps_within(interval, self.longest_step);
         let step = interval / f64::from(steps);
-        if step.to_bits() != self.step.to_bits() {
-            self.step = step;
-            self.structure.set_step(step);
-            for actuator in &mut self.actuators {
-                actuator.set_step(step);
-            }
-        }
+        self.structure.set_step(step);
+        self.actuators.set_step(step);
         for tick in 0..steps {
-            for (actuator, voltage) in self.actuators.iter_mut().zip(voltages) {
-                actuator.advance(*voltage, tick == 0);
-            }
-            let displacement = self.free_displacements();
+            let free = self.actuators.advance(&lanes_of(voltages), tick == 0);
+            self.displacement = std::array::from_fn(|k| (free[k] - self.rest[k]) * 1e-6);
             let before = [self.structure.pose(), self.structure.rate()];
-            self.structure.advance(&displacement);
+            self.structure.advance(&self.free_displacements());
             gauges_follow(&mut self.gauges, &before, &[self.structure.pose(), self.structure.rate()], step);
         }
     }
@@ -245,31 +177,25 @@ impl PlatformPlant {
     /// h, from rest, m and rad.
     #[must_use]
     pub fn pose(&self) -> Six {
-        self.whole_tick.as_ref().map_or_else(|| self.structure.pose(), |whole| whole.pose())
+        self.long.as_ref().map_or_else(|| self.structure.pose(), |long| long.pose())
     }
 
     /// ḣ, m/s and rad/s.
     #[must_use]
     pub fn rate(&self) -> Six {
-        self.whole_tick.as_ref().map_or_else(|| self.structure.rate(), |whole| whole.rate())
+        self.long.as_ref().map_or_else(|| self.structure.rate(), |long| long.rate())
     }
 
     /// d_i: displacement of each leg without load since rest, m.
     #[must_use]
     pub fn free_displacements(&self) -> Six {
-        match &self.whole_tick {
-            None => self.actuators.each_ref().map(Actuator::free_displacement),
-            Some(whole) => std::array::from_fn(|leg| (whole.leg(leg).0 - self.actuators[leg].rest) * 1e-6),
-        }
+        std::array::from_fn(|leg| self.displacement[leg])
     }
 
     /// Voltages of the stacks, V.
     #[must_use]
     pub fn stack_voltages(&self) -> Six {
-        match &self.whole_tick {
-            None => self.actuators.each_ref().map(|actuator| actuator.amplifier.voltage),
-            Some(whole) => std::array::from_fn(|leg| whole.leg(leg).1),
-        }
+        std::array::from_fn(|leg| self.actuators.voltages()[leg])
     }
 
     /// The structure; while long steps are in use, its state when they began.
@@ -303,15 +229,6 @@ impl PlatformPlant {
     pub fn wrench(&self) -> Wrench {
         let disturbance = self.structure.disturbance();
         self.structure.contact().map_or(disturbance, |contact| contact.wrench(&self.pose()).and(&disturbance))
-    }
-}
-
-/// Holds six voltages (V) for a number of long steps.
-fn hold_long(whole: &mut WholeTick, gauges: &mut Option<[SmoothLag; 6]>, voltages: &Six, steps: u32) {
-    for _ in 0..steps {
-        let before = [whole.pose(), whole.rate()];
-        whole.advance(voltages);
-        gauges_follow(gauges, &before, &[whole.pose(), whole.rate()], whole.step());
     }
 }
 

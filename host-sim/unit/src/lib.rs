@@ -12,7 +12,7 @@ pub mod ffi;
 use std::fmt;
 
 use host_sim::closed_loop::{LEGS, Preparation, Rig};
-use host_sim::plant::{LegParameters, LegPlant, NoiseParameters};
+use host_sim::plant::{LegParameters, NoiseParameters};
 use host_sim::platform::rig::Noise;
 use host_sim::platform::{GaugeSignal, PlatformParameters, PlatformRig, Specimen, Wrench};
 use host_sim::scenario::LegScenario;
@@ -194,7 +194,7 @@ pub enum Plant {
     /// Six gauges see a platform.
     Platform(Box<PlatformRig>),
     /// Six legs, each with its own gauge.
-    Legs(Box<Rig<LegPlant>>),
+    Legs(Box<Rig>),
 }
 
 impl Plant {

@@ -4,7 +4,7 @@
 use super::bench::{ARM, ARMING, DISARMED, FAULTED, HOLD, HOLDING, NOTHING, RAMP_DOWN, RAMPING, RUN, RUNNING};
 use host_sim::closed_loop::Rig;
 use host_sim::controller::{MachineWord, Supervised, TickController};
-use host_sim::plant::{LegParameters, LegPlant};
+use host_sim::plant::LegParameters;
 use host_sim::platform::PlatformRig;
 use host_sim::word::Scalar;
 use rand_chacha::ChaCha8Rng;
@@ -22,7 +22,7 @@ type Six = [f64; 6];
 #[derive(Clone)]
 enum Plant {
     Platform(Box<PlatformRig>),
-    Legs(Box<Rig<LegPlant>>),
+    Legs(Box<Rig>),
 }
 
 impl Plant {

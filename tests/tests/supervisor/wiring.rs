@@ -94,7 +94,7 @@ fn arm_until(
 
 /// Six legs and what the gauges show of their free displacements.
 struct Legs {
-    rig: Rig<LegPlant>,
+    rig: Rig,
     mix: Matrix,
     noise: Gaussian,
     /// What shakes the gauges, m and Hz, and for how long it did, s.

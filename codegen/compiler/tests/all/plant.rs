@@ -5,7 +5,7 @@
 use std::f64::consts::TAU;
 
 use host_sim::closed_loop::Preparation;
-use host_sim::plant::{LegParameters, LegPlant, Plant};
+use host_sim::plant::{LegParameters, LegPlant};
 use host_sim::platform::{PlatformParameters, PlatformPlant, Specimen};
 use specgen_compiler::stability::platform::{ClosedLoop, Conditions, Tuning};
 use specgen_compiler::stability::{LegDynamics, spectral_radius};

@@ -4,7 +4,6 @@ use std::path::Path;
 use std::time::Instant;
 
 use host_sim::closed_loop::{Rig, RunError, Tracking};
-use host_sim::plant::LegPlant;
 use host_sim::platform::rig::{OnBoard, PlatformRun};
 use host_sim::platform::scenario::{FREE_MODES, select as select_platform};
 use host_sim::platform::table::{MachiningTable, PoseRow};
@@ -274,7 +273,7 @@ fn mode(name: &str, known: &[(&'static str, u32)]) -> Result<(&'static str, u32)
 }
 
 /// Six legs at rest, with their gauges zeroed.
-fn legs(compiled: &Compilation, samples: u32, options: &Options<'_>, ui: &Ui) -> Result<Rig<LegPlant>, PlanError> {
+fn legs(compiled: &Compilation, samples: u32, options: &Options<'_>, ui: &Ui) -> Result<Rig, PlanError> {
     let (parameters, noise) = options.plant.read()?;
     ui.progress("preparing six legs: pre-cycle, settling, gauges zeroed");
     let legs = std::array::from_fn(|_| parameters.clone());

@@ -3,7 +3,7 @@
 use crate::record::Sample;
 use host_sim::closed_loop::Rig;
 use host_sim::controller::Supervised;
-use host_sim::plant::{LegParameters, LegPlant};
+use host_sim::plant::LegParameters;
 use host_sim::platform::rig::{Noise, PlatformRig};
 use host_sim::record::Block;
 use specgen_compiler::compile::Compilation;
@@ -26,7 +26,7 @@ const HALVINGS: u32 = 14;
 #[derive(Clone)]
 enum SimulatedMachine {
     Platform(Box<PlatformRig>),
-    Legs(Box<Rig<LegPlant>>),
+    Legs(Box<Rig>),
 }
 
 impl SimulatedMachine {

@@ -138,7 +138,8 @@ fn long_from_finest(specimen: &Specimen, part: Option<WorkPart>, step: f64) -> [
     whole.step_whole_ticks(1e-4);
     half.step_whole_ticks(1e-4);
     let reference = driven(&mut finest, 1000);
-    assert!(whole.whole_tick.is_some() && half.whole_tick.as_ref().unwrap().step() == 0.5e-4);
+    assert!(whole.long.is_some() && half.long.is_some());
+    assert_eq!([whole.actuators.step(), half.actuators.step()], [1e-4, 0.5e-4]);
     [whole, half].map(|mut plant| worst(&driven(&mut plant, 1000), &reference))
 }
 
@@ -210,32 +211,41 @@ fn intervals_longer_than_a_long_step_are_several_and_others_may_follow() {
         long.hold(&volts, interval);
         assert!(worst(&[fine.pose()], &[long.pose()]) < 50e-12, "{tick}: {:?} {:?}", fine.pose(), long.pose());
     }
-    assert!(long.whole_tick.as_ref().is_some_and(|whole| whole.step() == 1e-4));
+    assert!(long.long.is_some());
+    assert_eq!(long.actuators.step(), 1e-4);
 }
 
-/// The pre-cycle of the parameter files, 20 V/s and 50 µs.
+/// The pre-cycle of the parameter files, 20 V/s and 50 µs; one leg takes less than the others.
 #[test]
 fn a_pre_cycle_in_long_steps_leaves_the_legs_where_small_steps_do() {
-    for (name, specimen) in classes() {
-        let preparation = Preparation::of(&specimen.legs[0], 0.0);
-        let [mut long, mut small] = [PlatformPlant::new(&specimen), PlatformPlant::new(&specimen)];
-        assert!(long.cycle_long(&Preparation { update: LONG * preparation.update, ..preparation }));
-        small.cycle_small(&preparation);
+    for (name, mut specimen) in classes() {
+        specimen.legs[2].u_max = 90.0;
+        let preparation @ Preparation { rate, settle, update, .. } = Preparation::of(&specimen.legs[0], 0.0);
+        let mut long = PlatformPlant::new(&specimen);
+        let mut small = long.actuators.clone();
+        long.cycle(&preparation);
+        let peaks = lanes_of(&specimen.legs.each_ref().map(|leg| leg.u_max));
+        let steps = steps_within(100.0 / rate, update);
+        small.set_step(100.0 / rate / f64::from(steps));
+        for step in (1..=steps).chain((0..steps).rev()) {
+            small.advance(&peaks.map(|peak| peak * f64::from(step) / f64::from(steps)), true);
+        }
+        let steps = steps_within(settle, update);
+        small.set_step(settle / f64::from(steps));
+        for _ in 0..steps {
+            small.advance(&[0.0; LANES], true);
+        }
         // Where they rest, and what the history is to a drive through all plays.
         for volts in [0.0, 100.0] {
-            for (leg, (a, b)) in long.actuators.iter_mut().zip(&mut small.actuators).enumerate() {
-                for actuator in [&mut *a, &mut *b] {
-                    actuator.set_step(2e-5);
-                    (0..500).for_each(|_| actuator.advance(volts, true));
-                }
-                let apart = (a.displacement - b.displacement).abs() * 1e-6;
+            let [long, small] = [&mut long.actuators, &mut small].map(|actuators| {
+                actuators.set_step(2e-5);
+                (0..500).fold([0.0; LANES], |_, _| actuators.advance(&lanes_of(&[volts; 6]), true))
+            });
+            for leg in 0..6 {
+                let apart = (long[leg] - small[leg]).abs() * 1e-6;
                 assert!(apart < 10e-12, "{name}, {volts} V, leg {leg}: {apart:e}");
             }
         }
-        // Legs that differ go through it one by one.
-        let mut unequal = specimen.clone();
-        unequal.legs[2].u_max = 90.0;
-        assert!(!PlatformPlant::new(&unequal).cycle_long(&preparation));
     }
 }
 
@@ -249,14 +259,14 @@ fn a_part_that_may_let_go_is_met_in_small_steps_and_left_in_long_ones() {
         driven(plant, 100);
     }
     assert_eq!(long.pose().map(f64::to_bits), small.pose().map(f64::to_bits));
-    assert!(long.whole_tick.is_none());
+    assert!(long.long.is_none());
     long.release();
     driven(&mut long, 1);
-    assert!(long.whole_tick.is_some());
+    assert!(long.long.is_some());
     long.step_small();
-    assert!(long.whole_tick.is_none());
+    assert!(long.long.is_none());
     driven(&mut long, 1);
-    assert!(long.whole_tick.is_none());
+    assert!(long.long.is_none());
 }
 
 #[test]
@@ -268,16 +278,15 @@ fn whole_ticks_have_the_same_bits_on_every_processor_and_end_where_they_must() {
     for tick in 0..500 {
         let volts = std::array::from_fn(|leg| f64::from(tick % (50 + 7 * leg as u32)));
         plant.hold(&volts, 1e-4);
-        plain.whole_tick.as_mut().unwrap().advance_plainly(&volts);
+        let structure = plain.long.as_mut().unwrap();
+        plain.displacement = long_step::advance_anywhere(&mut plain.actuators, structure, &plain.rest, &volts);
         assert_eq!(plant.pose().map(f64::to_bits), plain.pose().map(f64::to_bits), "tick {tick}");
     }
     let (pose, voltages, free) = (plant.pose(), plant.stack_voltages(), plant.free_displacements());
     plant.touch(WorkPart::glass());
-    assert!(plant.whole_tick.is_none());
+    assert!(plant.long.is_none());
     assert_eq!((plant.pose(), plant.stack_voltages()), (pose, voltages));
-    for (after, before) in plant.free_displacements().iter().zip(free) {
-        assert!((after - before).abs() < 1e-18);
-    }
+    assert_eq!(plant.free_displacements(), free);
 }
 
 /// What gauges show of a kick, against an integration of their lag of its own behind the true pose of fine steps.

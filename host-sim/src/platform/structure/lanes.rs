@@ -6,10 +6,10 @@
 //! What the exact forces differ from the linear ones is extrapolated over the step as ever.
 
 use super::{STATES, Structure, sum};
-use crate::plant::lanes::{LANES, Lane, StepShape};
+use crate::plant::StepShape;
 use crate::platform::contact::Contact;
 use crate::platform::geometry::{angles, attitude, rate_matrix};
-use crate::platform::linear::{Matrix6, Six, apply, exponential, inverse, product};
+use crate::platform::linear::{LANES, Lane, Matrix6, Six, apply, exponential, inverse, product};
 
 type Column = [f64; STATES];
 
@@ -48,9 +48,12 @@ fn lane(of: impl Fn(usize) -> f64) -> Lane {
 }
 
 impl StructureLanes {
-    /// Copies the structure, for steps of `step` (s); `lag` of each leg's amplifier, s. A part in contact acts in both
-    /// directions.
-    pub(in crate::platform) fn of(structure: &Structure, step: f64, lag: &Six) -> Self {
+    /// Copies the structure, for steps of `step` (s); `lag` of each leg's amplifier, s. None if a contact may open, or
+    /// if there is a disturbance.
+    pub(in crate::platform) fn of(structure: &Structure, step: f64, lag: &Lane) -> Option<Self> {
+        if structure.disturbance.is_some() || structure.contact.is_some_and(|contact| contact.part.one_sided) {
+            return None;
+        }
         let parameters = &structure.parameters;
         let geometry = &parameters.geometry;
         let flexibility = inverse(&structure.mass);
@@ -91,7 +94,7 @@ impl StructureLanes {
             })
         };
         // Faster than a ten-thousandth of the step is at once.
-        let decays = lag.map(|lag| if lag * 1e4 > step { step / lag } else { 0.0 });
+        let decays = std::array::from_fn(|leg| if lag[leg] * 1e4 > step { step / lag[leg] } else { 0.0 });
         let decaying = respond(&driven, 0, &decays);
         let from_held = columns(&by_leg, STATES);
         let from_lagged = std::array::from_fn(|leg| {
@@ -127,7 +130,7 @@ impl StructureLanes {
         };
         out.difference = out.force_difference();
         out.before = out.difference;
-        out
+        Some(out)
     }
 
     /// h, m and rad.
@@ -140,14 +143,9 @@ impl StructureLanes {
         std::array::from_fn(|k| self.state[6 + k])
     }
 
-    /// Free displacement of a leg, m.
-    pub(in crate::platform) fn displacement(&self, leg: usize) -> f64 {
-        self.displacement[leg]
-    }
-
     /// One step, over which the free displacements go along `free` (m).
     #[inline(always)]
-    pub(in crate::platform) fn advance(&mut self, free: &StepShape) {
+    pub(in crate::platform) fn advance(&mut self, free: &StepShape<LANES>) {
         let mut of_state = [0.0; STATES];
         let mut of_legs = [0.0; STATES];
         let mut of_forces = [0.0; STATES];
@@ -261,7 +259,7 @@ mod tests {
         let mut structure = Structure::new(specimen.structure(), 1e-4);
         let pose = [11e-6, -7e-6, 23e-6, 90e-6, -70e-6, 200e-6];
         structure.set_state(&pose, &[1e-3, -2e-3, 5e-4, 0.01, 0.02, -0.03], &[3e-6, 8e-6, 1e-5, 2e-5, 4e-6, 9e-6]);
-        let lanes = StructureLanes::of(&structure, 1e-4, &[0.35e-3; 6]);
+        let lanes = StructureLanes::of(&structure, 1e-4, &[0.35e-3; LANES]).unwrap();
         let largest = structure.difference.iter().fold(0.0, |a: f64, b| a.max(b.abs()));
         for (found, expected) in lanes.difference.iter().zip(&structure.difference) {
             assert!(
