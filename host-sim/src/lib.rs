@@ -15,6 +15,7 @@ pub mod controller;
 pub mod coverage;
 pub mod description;
 pub mod forc;
+pub mod machine;
 pub mod noise;
 pub mod plant;
 pub mod platform;

@@ -7,8 +7,7 @@
 
 mod serve;
 
-use host_sim::closed_loop::Rig;
-use host_sim::platform::PlatformRig;
+use host_sim::machine::Machine;
 use specgen_rt::exchange::{Actuation, CHANNELS, Sensing};
 use specgen_runtime::supervisor::{Finding, with};
 
@@ -31,34 +30,9 @@ const IDENTITY: [[f64; CHANNELS]; CHANNELS] = {
     rows
 };
 
-/// A prepared plant.
-pub enum Plant {
-    /// A platform measured by six gauges.
-    Platform(Box<PlatformRig>),
-    /// Six legs, each with its own gauge.
-    Legs(Box<Rig>),
-}
-
-impl Plant {
-    fn hold(&mut self, voltages: &[f64; CHANNELS], interval: f64) {
-        match self {
-            Self::Platform(rig) => rig.hold(voltages, interval),
-            Self::Legs(rig) => rig.hold(voltages, interval),
-        }
-    }
-
-    /// Readings of the gauges in the unit of their converters, and the wrench, N and N m.
-    fn read(&mut self) -> ([f64; CHANNELS], [f64; CHANNELS]) {
-        match self {
-            Self::Platform(rig) => (rig.read_gauges(), rig.read_wrench()),
-            Self::Legs(rig) => (rig.read(), [0.0; CHANNELS]),
-        }
-    }
-}
-
 /// The plant with its converters and its time.
 pub struct PlantServer {
-    plant: Plant,
+    plant: Machine,
     gauges: ir::GaugeConverter,
     volts_at_zero: f64,
     volts_per_code: f64,
@@ -84,7 +58,7 @@ pub struct PlantServer {
 impl PlantServer {
     /// The plant of a spec, with amplifiers off.
     #[must_use]
-    pub fn new(plant: Plant, model: &Model, ir: &Ir) -> Self {
+    pub fn new(plant: Machine, model: &Model, ir: &Ir) -> Self {
         let [low, high] = model.actuator.voltage;
         let rest = Model::nearest_to_zero(low, high);
         Self {
@@ -136,7 +110,7 @@ impl PlantServer {
         match self.last {
             Some(last) if last.tick == self.tick => last,
             _ => {
-                let (gauges, wrench) = self.plant.read();
+                let (gauges, wrench) = (self.plant.read_gauges(), self.plant.read_wrench());
                 let gauges = if matches!(self.wired, Finding::Gauge(..)) { self.mixed(&gauges, 0.0) } else { gauges };
                 let codes = gauges.map(|value| self.code(value));
                 let sensing =

@@ -11,7 +11,8 @@ pub mod ffi;
 
 use std::fmt;
 
-use host_sim::closed_loop::{LEGS, Preparation, Rig};
+use host_sim::closed_loop::{LEGS, Preparation};
+use host_sim::machine::Machine;
 use host_sim::plant::{LegParameters, NoiseParameters};
 use host_sim::platform::rig::Noise;
 use host_sim::platform::{GaugeSignal, PlatformParameters, PlatformRig, Specimen, Wrench};
@@ -173,7 +174,7 @@ impl Description {
                 }
                 // As `specgen sim` takes them.
                 rig.plant_mut().step_whole_ticks(self.period);
-                Plant::Platform(Box::new(rig))
+                Plant(Machine::Platform(Box::new(rig)))
             }
             Kind::Legs { voltages } => {
                 let mut leg = self.leg.clone();
@@ -182,7 +183,7 @@ impl Description {
                 let noise = if noise { leg.noise } else { NoiseParameters::NONE };
                 let legs: [_; LEGS] = std::array::from_fn(|_| leg.clone());
                 let scenario = LegScenario::resting(&legs, &noise, seed, NO_TRAJECTORY, *voltages);
-                Plant::Legs(Box::new(scenario.rig().clone()))
+                Plant(Machine::Legs(Box::new(scenario.rig().clone())))
             }
         }
     }
@@ -190,12 +191,7 @@ impl Description {
 
 /// A prepared machine.
 #[derive(Debug, Clone)]
-pub enum Plant {
-    /// Six gauges see a platform.
-    Platform(Box<PlatformRig>),
-    /// Six legs, each with its own gauge.
-    Legs(Box<Rig>),
-}
+pub struct Plant(Machine);
 
 impl Plant {
     /// Holds the inputs for `interval` (s): six reals for each of [`Description::inputs`].
@@ -211,28 +207,25 @@ impl Plant {
         let six = |stem: usize| inputs.get(6 * stem..6 * stem + 6).and_then(|six| <[f64; 6]>::try_from(six).ok());
         let missing = UnitError(c"inputs are missing");
         let voltages = six(0).ok_or(missing)?;
-        match self {
-            Self::Platform(rig) => {
-                let [fx, fy, fz, tx, ty, tz] = six(1).ok_or(missing)?;
-                rig.plant_mut().disturb(&Wrench { force: [fx, fy, fz], torque: [tx, ty, tz] });
-                rig.hold(&voltages, interval);
-            }
-            Self::Legs(rig) => rig.hold(&voltages, interval),
+        if let Machine::Platform(rig) = &mut self.0 {
+            let [fx, fy, fz, tx, ty, tz] = six(1).ok_or(missing)?;
+            rig.plant_mut().disturb(&Wrench { force: [fx, fy, fz], torque: [tx, ty, tz] });
         }
+        self.0.hold(&voltages, interval);
         Ok(())
     }
 
     /// Reads the sensors, whose noise is drawn, and looks at the rest: six reals for each of [`Description::outputs`].
     pub fn read(&mut self, outputs: &mut [f64]) {
-        let found: Vec<[f64; 6]> = match self {
-            Self::Platform(rig) => {
+        let found: Vec<[f64; 6]> = match &mut self.0 {
+            Machine::Platform(rig) => {
                 let (gauge, wrench) = (rig.read_gauges(), rig.read_wrench());
                 let plant = rig.plant();
                 let pose = plant.pose();
                 let extension = plant.structure().parameters().geometry.extensions(&pose);
                 vec![gauge, wrench, pose, extension, plant.stack_voltages()]
             }
-            Self::Legs(rig) => vec![rig.read(), rig.displacements()],
+            Machine::Legs(rig) => vec![rig.read(), rig.displacements()],
         };
         outputs.iter_mut().zip(found.as_flattened()).for_each(|(output, value)| *output = *value);
     }

@@ -2,10 +2,9 @@
 //! that no sample of a machine without a fault is replaced.
 
 use super::bench::{ARM, ARMING, DISARMED, FAULTED, HOLD, HOLDING, NOTHING, RAMP_DOWN, RAMPING, RUN, RUNNING};
-use host_sim::closed_loop::Rig;
 use host_sim::controller::{MachineWord, Supervised, TickController};
+use host_sim::machine::Machine;
 use host_sim::plant::LegParameters;
-use host_sim::platform::PlatformRig;
 use host_sim::word::Scalar;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
@@ -19,43 +18,21 @@ use std::fs;
 type Six = [f64; 6];
 
 /// The simulated machine of a spec.
-#[derive(Clone)]
-enum Plant {
-    Platform(Box<PlatformRig>),
-    Legs(Box<Rig>),
+fn prepared(compiled: &Compilation, leg: &LegParameters, seed: u64) -> Machine {
+    let model = &compiled.model;
+    if model.task_space.is_none() {
+        let leg = machine::leg(model, leg);
+        let scenario = machine::legs(model, &std::array::from_fn(|_| leg.clone()), &leg.noise, seed, 1);
+        return Machine::Legs(Box::new(scenario.rig().clone()));
+    }
+    Machine::Platform(Box::new(scenario(compiled, leg, seed).rig().clone()))
 }
 
-impl Plant {
-    fn new(compiled: &Compilation, leg: &LegParameters, seed: u64) -> Self {
-        let model = &compiled.model;
-        if model.task_space.is_none() {
-            let leg = machine::leg(model, leg);
-            let scenario = machine::legs(model, &std::array::from_fn(|_| leg.clone()), &leg.noise, seed, 1);
-            return Self::Legs(Box::new(scenario.rig().clone()));
-        }
-        Self::Platform(Box::new(scenario(compiled, leg, seed).rig().clone()))
-    }
-
-    fn read(&mut self) -> Six {
-        match self {
-            Self::Platform(rig) => rig.read_gauges(),
-            Self::Legs(rig) => rig.read(),
-        }
-    }
-
-    fn hold(&mut self, voltages: &Six, interval: f64) {
-        match self {
-            Self::Platform(rig) => rig.hold(voltages, interval),
-            Self::Legs(rig) => rig.hold(voltages, interval),
-        }
-    }
-
-    /// Pose, m and rad, or displacements of the legs, m.
-    fn truth(&self) -> Six {
-        match self {
-            Self::Platform(rig) => rig.plant().pose(),
-            Self::Legs(rig) => rig.displacements(),
-        }
+/// Pose, m and rad, or displacements of the legs, m.
+fn truth(machine: &Machine) -> Six {
+    match machine {
+        Machine::Platform(rig) => rig.plant().pose(),
+        Machine::Legs(rig) => rig.displacements(),
     }
 }
 
@@ -75,7 +52,7 @@ struct Places {
 /// A controller and its plant, tick by tick.
 struct Loop {
     machine: Supervised,
-    plant: Plant,
+    plant: Machine,
     scalar: Scalar,
     period: f64,
     input: Vec<u64>,
@@ -115,7 +92,7 @@ impl Loop {
         };
         Self {
             middle,
-            plant: Plant::new(&emitted.compiled, leg, seed),
+            plant: prepared(&emitted.compiled, leg, seed),
             scalar,
             period: emitted.compiled.model.timing.period,
             input: vec![0; inputs.len()],
@@ -142,7 +119,7 @@ impl Loop {
 
     /// A tick whose sample is spoiled: words in m or V.
     fn spoiled(&mut self, request: u64, spoil: impl FnOnce(&mut Six)) -> MachineWord {
-        let mut words = self.plant.read();
+        let mut words = self.plant.read_gauges();
         spoil(&mut words);
         let encode = |words: &mut [u64], values: &Six| {
             for (slot, value) in words.iter_mut().zip(values) {
@@ -211,7 +188,7 @@ fn moved_by(steady: &Loop, bit: i32, span: f64) -> (f64, u32, u32) {
     let path: Vec<Six> = (0..AFTER)
         .map(|_| {
             twin.tick(RUN);
-            twin.plant.truth()
+            truth(&twin.plant)
         })
         .collect();
     let (mut most, mut replaced, mut out) = (0.0_f64, 0, 0);
@@ -230,7 +207,7 @@ fn moved_by(steady: &Loop, bit: i32, span: f64) -> (f64, u32, u32) {
                     assert_eq!(machine.conditions() >> 16, 0x41 << gauge, "the gauge is named as replaced");
                     replaced += 1;
                 }
-                most = most.max(apart(&machine.plant.truth(), good));
+                most = most.max(apart(&truth(&machine.plant), good));
             }
             out += u32::from(beyond);
             assert_eq!(machine.word.phase, RUNNING);
@@ -503,7 +480,7 @@ fn fault_free(spec: &str, ticks: u64) -> ([u64; 6], [u64; 2]) {
                 FAULTED,
                 "{spec}, tick {tick}: {word:?}, conditions {conditions:x}, set-point {:?}, truth {:?}",
                 machine.setpoint,
-                machine.plant.truth()
+                truth(&machine.plant)
             );
             seen[0] += u64::from(machine.status() & SAMPLE_REPLACED != 0 || conditions >> 22 != 0);
             seen[1] += u64::from(machine.status() & SAMPLE_REPEATED != 0);

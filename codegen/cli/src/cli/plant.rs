@@ -1,6 +1,7 @@
 //! `specgen plant`: serves the simulated machine of a spec in shared memory to the real-time target on the same computer.
 
 use clap::Args;
+use host_sim::machine::Machine;
 use specgen_compiler::{lower, spec_file};
 use specgen_rt::exchange;
 
@@ -10,7 +11,7 @@ use super::sim::PlantArguments;
 use specgen_compiler::compile::Compilation;
 use specgen_language::outcome::Failure;
 use specgen_language::ui::Ui;
-use specgen_operate::served::{Options, Plant, serve};
+use specgen_operate::served::{Options, serve};
 use specgen_runtime::supervisor::Finding;
 use specgen_studies::machine;
 
@@ -75,16 +76,16 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
 }
 
 /// The machine after its pre-cycle, with the gauges zeroed.
-fn prepared(arguments: &Arguments, compiled: &Compilation, ui: &Ui) -> Result<Plant, Failure> {
+fn prepared(arguments: &Arguments, compiled: &Compilation, ui: &Ui) -> Result<Machine, Failure> {
     let plant = arguments.plant.options();
     ui.progress("preparing the machine: pre-cycle, settling, gauges zeroed");
     Ok(match &compiled.model.task_space {
-        Some(task) => Plant::Platform(Box::new(plant.platform(&compiled.model, task)?.1.rig().clone())),
+        Some(task) => Machine::Platform(Box::new(plant.platform(&compiled.model, task)?.1.rig().clone())),
         None => {
             let (leg, noise) = plant.read()?;
             let legs = std::array::from_fn(|_| leg.clone());
             let scenario = machine::legs(&compiled.model, &legs, &noise, plant.seed, NO_TRAJECTORY);
-            Plant::Legs(Box::new(scenario.rig().clone()))
+            Machine::Legs(Box::new(scenario.rig().clone()))
         }
     })
 }

@@ -381,7 +381,7 @@ impl Exchanged {
         let specimen = machine::specimen(&compiled.model, task, &leg, Some(1));
         let noise = host_sim::platform::rig::Noise::of(&specimen);
         let scenario = machine::scenario(&compiled.model, task, &specimen, &noise, 1);
-        let plant = served::Plant::Platform(Box::new(scenario.rig().clone()));
+        let plant = host_sim::machine::Machine::Platform(Box::new(scenario.rig().clone()));
         let mut served = served::PlantServer::new(plant, &compiled.model, &compiled.ir);
         let server = Server::create(&path_of(name).unwrap(), digest).unwrap();
         let stop = Arc::new(AtomicBool::new(false));

@@ -3,6 +3,7 @@
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use host_sim::machine::Machine;
 use serde::Serialize;
 use specgen_compiler::compile::Compilation;
 use specgen_language::interrupt;
@@ -14,7 +15,7 @@ use specgen_rt::histogram::{Histogram, known_text, time_text};
 use specgen_rt::scheduling;
 use specgen_runtime::supervisor::Finding;
 
-use super::{Plant, PlantServer};
+use super::PlantServer;
 
 /// Timeout of a wait for a controller, after which it checks whether to end, ns.
 const TIMEOUT: u64 = SECOND / 10;
@@ -66,7 +67,7 @@ impl Outcome for Summary {
 /// # Errors
 /// The file is already in use, the system refuses the processor or the priority, or the shared memory is damaged.
 pub fn serve(
-    plant: Plant,
+    plant: Machine,
     compiled: &Compilation,
     path: &Path,
     options: Options<'_>,

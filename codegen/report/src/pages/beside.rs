@@ -1,10 +1,10 @@
 //! Replays the commands of a record with a simulated machine instead of the recorded one.
 
 use crate::record::Sample;
-use host_sim::closed_loop::Rig;
 use host_sim::controller::Supervised;
+use host_sim::machine::Machine;
 use host_sim::plant::LegParameters;
-use host_sim::platform::rig::{Noise, PlatformRig};
+use host_sim::platform::rig::Noise;
 use host_sim::record::Block;
 use specgen_compiler::compile::Compilation;
 use specgen_language::model::Model;
@@ -22,86 +22,55 @@ const STEPS: u32 = 50;
 /// Number of bisections for a peak: to 6 mV of 100 V.
 const HALVINGS: u32 = 14;
 
-/// The simulated machine of a spec, as seen by a controller.
-#[derive(Clone)]
-enum SimulatedMachine {
-    Platform(Box<PlatformRig>),
-    Legs(Box<Rig>),
+/// The simulated machine of a spec, prepared.
+fn prepared(model: &Model) -> Machine {
+    let leg = LegParameters::reference();
+    match &model.task_space {
+        Some(task) => {
+            let specimen = machine::specimen(model, task, &leg, Some(SEED));
+            let scenario = machine::scenario(model, task, &specimen, &Noise::of(&specimen), SEED);
+            Machine::Platform(Box::new(scenario.rig().clone()))
+        }
+        None => {
+            let leg = machine::leg(model, &leg);
+            let legs = std::array::from_fn(|_| leg.clone());
+            Machine::Legs(Box::new(machine::legs(model, &legs, &leg.noise, SEED, 1).rig().clone()))
+        }
+    }
 }
 
-impl SimulatedMachine {
-    /// Prepared: pre-cycled, at rest, gauges zeroed.
-    fn of(model: &Model) -> Self {
-        let leg = LegParameters::reference();
-        match &model.task_space {
-            Some(task) => {
-                let specimen = machine::specimen(model, task, &leg, Some(SEED));
-                let scenario = machine::scenario(model, task, &specimen, &Noise::of(&specimen), SEED);
-                Self::Platform(Box::new(scenario.rig().clone()))
-            }
-            None => {
-                let leg = machine::leg(model, &leg);
-                let legs = std::array::from_fn(|_| leg.clone());
-                Self::Legs(Box::new(machine::legs(model, &legs, &leg.noise, SEED, 1).rig().clone()))
+/// A machine at rest, led to the voltages of a tick, where the gauges read `reading`. A leg goes there through a peak that
+/// makes its gauge read so; which one it was, nobody knows. Each gauge of a platform sees all legs, which go there straight.
+fn led(machine: &Machine, model: &Model, voltages: &[f64; 6], reading: &[f64; 6]) -> Machine {
+    let rest = [model.rest_voltage(); 6];
+    let through = |peaks: &[f64; 6]| {
+        let mut machine = machine.clone();
+        for (from, to) in [(&rest, peaks), (peaks, voltages), (voltages, voltages)] {
+            for step in 1..=STEPS {
+                let share = f64::from(step) / f64::from(STEPS);
+                let between = std::array::from_fn(|leg| from[leg] + share * (to[leg] - from[leg]));
+                machine.hold(&between, SETTLE / f64::from(STEPS));
             }
         }
-    }
-
-    fn read(&mut self) -> [f64; 6] {
-        match self {
-            Self::Platform(rig) => rig.read_gauges(),
-            Self::Legs(rig) => rig.read(),
-        }
-    }
-
-    /// Reading of the force sensor; none for legs.
-    fn wrench(&mut self) -> [f64; 6] {
-        match self {
-            Self::Platform(rig) => rig.read_wrench(),
-            Self::Legs(_) => [0.0; 6],
-        }
-    }
-
-    fn hold(&mut self, voltages: &[f64; 6], interval: f64) {
-        match self {
-            Self::Platform(rig) => rig.hold(voltages, interval),
-            Self::Legs(rig) => rig.hold(voltages, interval),
-        }
-    }
-
-    /// This machine, at rest, brought to the voltages of a tick, with the gauges reading `reading`. A leg passes through a peak that
-    /// results in its reading; the actual peak is unknown. The gauges of a platform see all legs, so its legs move there directly.
-    fn led(&self, model: &Model, voltages: &[f64; 6], reading: &[f64; 6]) -> Self {
-        let rest = [model.rest_voltage(); 6];
-        let through = |peaks: &[f64; 6]| {
-            let mut machine = self.clone();
-            for (from, to) in [(&rest, peaks), (peaks, voltages), (voltages, voltages)] {
-                for step in 1..=STEPS {
-                    let share = f64::from(step) / f64::from(STEPS);
-                    let between = std::array::from_fn(|leg| from[leg] + share * (to[leg] - from[leg]));
-                    machine.hold(&between, SETTLE / f64::from(STEPS));
-                }
-            }
-            machine
-        };
-        let mut low = *voltages;
-        if matches!(self, Self::Legs(_)) {
-            let mut high = [model.actuator.voltage[1]; 6];
-            for _ in 0..HALVINGS {
-                let middle: [f64; 6] = std::array::from_fn(|leg| 0.5 * (low[leg] + high[leg]));
-                let found = through(&middle).read();
-                for leg in 0..6 {
-                    // The higher the peak, the longer the leg after it.
-                    if found[leg] < reading[leg] {
-                        low[leg] = middle[leg];
-                    } else {
-                        high[leg] = middle[leg];
-                    }
+        machine
+    };
+    let mut low = *voltages;
+    if matches!(machine, Machine::Legs(_)) {
+        let mut high = [model.actuator.voltage[1]; 6];
+        for _ in 0..HALVINGS {
+            let middle: [f64; 6] = std::array::from_fn(|leg| 0.5 * (low[leg] + high[leg]));
+            let found = through(&middle).read_gauges();
+            for leg in 0..6 {
+                // The higher the peak, the longer the leg after it.
+                if found[leg] < reading[leg] {
+                    low[leg] = middle[leg];
+                } else {
+                    high[leg] = middle[leg];
                 }
             }
         }
-        through(&low)
     }
+    through(&low)
 }
 
 /// Runs the commands of `blocks` with a simulated machine. `recorded` are the same ticks as recorded; in both, only comparable ticks
@@ -124,7 +93,7 @@ pub(super) fn simulate(
     let settle = (SETTLE / period) as u64;
     controller.reset();
     let power_up = controller.save();
-    let prepared = SimulatedMachine::of(&compiled.model);
+    let prepared = prepared(&compiled.model);
     let (mut machine, mut offset) = (prepared.clone(), [0.0; 6]);
     let mut output = vec![0; controller.output_names().len()];
     let mut samples: Vec<Sample> = Vec::with_capacity(recorded.len());
@@ -139,18 +108,18 @@ pub(super) fn simulate(
                 (block.state != power_up, recorded.get(samples.len()), block.rows.first())
             {
                 let reading = words.gauge.map(|place| words.scalar.decode(row.input[place]));
-                machine = prepared.led(&compiled.model, &first.voltage, &reading);
-                let found = machine.read();
+                machine = led(&prepared, &compiled.model, &first.voltage, &reading);
+                let found = machine.read_gauges();
                 offset = std::array::from_fn(|k| reading[k] - found[k]);
                 settled = block.first + settle;
             }
         }
         for row in &block.rows {
             let mut input = row.input.clone();
-            for ((place, value), offset) in words.gauge.iter().zip(machine.read()).zip(offset) {
+            for ((place, value), offset) in words.gauge.iter().zip(machine.read_gauges()).zip(offset) {
                 input[*place] = words.scalar.encode(value + offset);
             }
-            for (place, value) in words.wrench.iter().flatten().zip(machine.wrench()) {
+            for (place, value) in words.wrench.iter().flatten().zip(machine.read_wrench()) {
                 input[*place] = words.scalar.encode(value);
             }
             // A tick that was late on the machine is not late here.
