@@ -6,7 +6,7 @@ mod paper;
 mod step;
 
 pub use multisine::Multisine;
-pub use paper::{Jump, PaperPath, PaperPose, Reading};
+pub use paper::{PaperPath, PaperPose, Reading};
 pub use step::Step;
 
 /// A motion of the six legs from time 0.

@@ -10,15 +10,13 @@ pub struct WorkPart {
     pub stiffness: Three,
     /// Tip in {P}, m.
     pub tip: Three,
-    /// Whether the part only pushes: no force while the tip is below the point of contact.
-    pub one_sided: bool,
 }
 
 impl WorkPart {
     /// Diamond tip 40 mm above P_C on a part of `stiffness` k (N/m): K = diag(0.8, 0.8, 1) k, in both directions.
     #[must_use]
     pub const fn of_stiffness(stiffness: f64) -> Self {
-        Self { stiffness: [0.8 * stiffness, 0.8 * stiffness, stiffness], tip: [0.0, 0.0, 0.04], one_sided: false }
+        Self { stiffness: [0.8 * stiffness, 0.8 * stiffness, stiffness], tip: [0.0, 0.0, 0.04] }
     }
 
     /// Glass, k = 3 MN/m: order of magnitude of a Rockwell tip at 1 to 10 µm of indentation.
@@ -96,38 +94,24 @@ impl Contact {
     }
 
     /// Displacement of the tip from the point of contact, m.
-    #[must_use]
-    pub fn deflection(&self, pose: &Six) -> Three {
+    fn deflection(&self, pose: &Six) -> Three {
         let arm = apply(&rotation(angles(pose)), &self.part.tip);
         [0, 1, 2].map(|k| (pose[k] - self.pose[k]) + (arm[k] - self.arm[k]))
     }
 
-    /// Whether the part pushes on the tip.
+    /// (5): force of the part on the platform.
     #[must_use]
-    pub fn closed(&self, pose: &Six) -> bool {
-        !self.part.one_sided || self.deflection(pose)[2] > 0.0
-    }
-
-    /// (5): force of the closed contact on the platform, computed whether or not it is closed.
-    #[must_use]
-    pub fn wrench_when_closed(&self, pose: &Six) -> Wrench {
+    pub fn wrench(&self, pose: &Six) -> Wrench {
         let deflection = self.deflection(pose);
         let force = [0, 1, 2].map(|k| -self.part.stiffness[k] * deflection[k]);
         Wrench { force, torque: cross(apply(&rotation(angles(pose)), &self.part.tip), force) }
     }
+}
 
-    /// Force of the part on the platform.
-    #[must_use]
-    pub fn wrench(&self, pose: &Six) -> Wrench {
-        if self.closed(pose) { self.wrench_when_closed(pose) } else { Wrench::default() }
-    }
-
+#[cfg(test)]
+impl Contact {
     /// Energy in the spring, J.
-    #[must_use]
-    pub fn energy(&self, pose: &Six) -> f64 {
-        if !self.closed(pose) {
-            return 0.0;
-        }
+    pub(super) fn energy(&self, pose: &Six) -> f64 {
         let d = self.deflection(pose);
         let k = self.part.stiffness;
         0.5 * (k[0] * d[0] * d[0] + k[1] * d[1] * d[1] + k[2] * d[2] * d[2])
@@ -174,12 +158,5 @@ mod tests {
             let slope = (contact.energy(&above) - contact.energy(&below)) / 2e-8;
             assert!((slope + force[k]).abs() < 1e-6 * (1.0 + force[k].abs()), "{k}: {slope} {}", force[k]);
         }
-    }
-
-    #[test]
-    fn a_one_sided_part_lets_go() {
-        let contact = Contact::at(WorkPart { one_sided: true, ..WorkPart::glass() }, &HOME);
-        assert_eq!(contact.wrench(&moved(2, -1e-9)), Wrench::default());
-        assert!(contact.wrench(&moved(2, 1e-9)).force[2] < 0.0);
     }
 }

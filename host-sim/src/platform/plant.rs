@@ -61,8 +61,7 @@ impl PlatformPlant {
     /// stays within 0.02 nm of that of the finest small steps, while small steps of 20 µs are off by 0.13 nm. With
     /// amplifiers faster than a step it stays within 0.3 nm, and at their current limit within 1 nm.
     ///
-    /// Small steps remain in use for a contact that may open, and for a disturbance. `interval` (s) is that of the
-    /// following holds; others are possible.
+    /// Small steps remain in use under a disturbance. `interval` (s) is that of the following holds; others are possible.
     pub fn step_whole_ticks(&mut self, interval: f64) {
         self.long_steps = true;
         self.lengthen(interval / f64::from(steps_within(interval, LONG * self.longest_step)));

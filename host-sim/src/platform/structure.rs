@@ -157,15 +157,14 @@ pub struct Structure {
     /// None is zero, and adds nothing.
     disturbance: Option<Wrench>,
     step: f64,
-    free: Propagator,
-    touching: Propagator,
+    propagator: Propagator,
     state: [f64; STATES],
     displacement: Six,
     /// Generalised force of the displacements, and what the exact forces differ from the linear ones.
     drive: Six,
     difference: Six,
-    /// The same one step earlier, if that step was of the same kind.
-    earlier: Option<(bool, Six)>,
+    /// The same one step earlier, if nothing has changed since.
+    earlier: Option<Six>,
 }
 
 impl Structure {
@@ -177,8 +176,8 @@ impl Structure {
         let weight_stiffness = parameters.weight_stiffness();
         let stiffness = sum(&parameters.stiffness_matrix(), &weight_stiffness);
         let damping = congruent(&jacobian, &parameters.damping);
-        let free = Propagator::new(&mass, &damping, &stiffness, step);
         Self {
+            propagator: Propagator::new(&mass, &damping, &stiffness, step),
             rest_lengths: parameters.geometry.rest_lengths(),
             parameters,
             mass,
@@ -190,8 +189,6 @@ impl Structure {
             contact_stiffness: [[0.0; 6]; 6],
             disturbance: None,
             step,
-            touching: free.clone(),
-            free,
             state: [0.0; STATES],
             displacement: [0.0; 6],
             drive: [0.0; 6],
@@ -216,17 +213,14 @@ impl Structure {
     pub fn set_step(&mut self, step: f64) {
         if step.to_bits() != self.step.to_bits() {
             self.step = step;
-            self.free = Propagator::new(&self.mass, &self.damping, &self.stiffness, step);
-            self.touching = self.touching_propagator();
-            self.earlier = None;
+            self.propagate_anew();
         }
     }
 
-    fn touching_propagator(&self) -> Propagator {
-        if self.contact.is_none() {
-            return self.free.clone();
-        }
-        Propagator::new(&self.mass, &self.damping, &sum(&self.stiffness, &self.contact_stiffness), self.step)
+    fn propagate_anew(&mut self) {
+        let stiffness = sum(&self.stiffness, &self.contact_stiffness);
+        self.propagator = Propagator::new(&self.mass, &self.damping, &stiffness, self.step);
+        self.earlier = None;
     }
 
     /// Makes contact with a part at the present pose, unloaded.
@@ -234,15 +228,16 @@ impl Structure {
         let pose = self.pose();
         self.contact_stiffness = part.stiffness_matrix(&pose);
         self.contact = Some(Contact::at(part, &pose));
-        self.touching = self.touching_propagator();
-        self.earlier = None;
+        self.propagate_anew();
         self.difference = self.force_difference();
     }
 
     /// Takes the part away.
     pub fn release(&mut self) {
-        self.contact = None;
-        self.contact_stiffness = [[0.0; 6]; 6];
+        if self.contact.take().is_some() {
+            self.contact_stiffness = [[0.0; 6]; 6];
+            self.propagate_anew();
+        }
         self.earlier = None;
         self.difference = self.force_difference();
     }
@@ -262,7 +257,7 @@ impl Structure {
         for k in 0..6 {
             let jump = after[k] - before[k];
             self.difference[k] += jump;
-            if let Some((_, earlier)) = &mut self.earlier {
+            if let Some(earlier) = &mut self.earlier {
                 earlier[k] += jump;
             }
         }
@@ -321,10 +316,6 @@ impl Structure {
         apply_transposed(&self.jacobian, &force)
     }
 
-    fn is_touching(&self) -> bool {
-        self.contact.as_ref().is_some_and(|contact| contact.closed(&self.pose()))
-    }
-
     /// Exact generalised force less the linear one of the propagator in use.
     fn force_difference(&self) -> Six {
         let (pose, rate) = (self.pose(), self.rate());
@@ -337,8 +328,8 @@ impl Structure {
             linear[k] = self.drive[k] - linear[k] - damped[k] + weight[k];
         }
         let mut out: Six = std::array::from_fn(|k| exact[k] - linear[k]);
-        if let Some(contact) = self.contact.as_ref().filter(|contact| contact.closed(&pose)) {
-            let pushed = contact.wrench_when_closed(&pose).generalised(&rate_matrix(angles(&pose)));
+        if let Some(contact) = &self.contact {
+            let pushed = contact.wrench(&pose).generalised(&rate_matrix(angles(&pose)));
             let spring = apply(&self.contact_stiffness, &pose);
             for k in 0..6 {
                 out[k] += pushed[k] + spring[k];
@@ -355,36 +346,15 @@ impl Structure {
 
     /// One step, over which the free displacements go straight to `displacement` (m).
     pub fn advance(&mut self, displacement: &Six) {
-        let touching = self.is_touching();
         let drive = self.drive_of(displacement);
-        let before = match self.earlier {
-            Some((kind, earlier)) if kind == touching => earlier,
-            _ => self.difference,
-        };
+        let before = self.earlier.unwrap_or(self.difference);
         let first = std::array::from_fn(|k| self.drive[k] + self.difference[k]);
         let last = std::array::from_fn(|k| drive[k] + (2.0 * self.difference[k] - before[k]));
-        let propagator = if touching { &self.touching } else { &self.free };
-        self.state = propagator.advance(&self.state, &first, &last);
+        self.state = self.propagator.advance(&self.state, &first, &last);
         self.displacement = *displacement;
         self.drive = drive;
-        self.earlier = Some((touching, self.difference));
+        self.earlier = Some(self.difference);
         self.difference = self.force_difference();
-    }
-
-    /// Energy of motion, of leg and contact springs, and of the weight on its leg forces at rest, J.
-    #[must_use]
-    pub fn energy(&self) -> f64 {
-        let (pose, rate) = (self.pose(), self.rate());
-        let momentum = apply(&self.mass, &rate);
-        let extensions = self.parameters.geometry.extensions(&pose);
-        let weight = apply(&self.weight_stiffness, &pose);
-        let mut twice = 0.0;
-        for k in 0..6 {
-            twice += pose[k] * weight[k];
-            let stretch = self.displacement[k] - extensions[k];
-            twice += rate[k] * momentum[k] + self.parameters.stiffness[k] * stretch * stretch;
-        }
-        0.5 * twice + self.contact.as_ref().map_or(0.0, |contact| contact.energy(&pose))
     }
 }
 

@@ -56,19 +56,6 @@ pub struct PaperPose {
     pub frequency: f64,
 }
 
-/// Where a trajectory is not smooth.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Jump {
-    /// s from the start.
-    pub time: f64,
-    /// 0 to 5: x, y, z, θx, θy, θz.
-    pub axis: usize,
-    /// Pose after less pose before, m or rad.
-    pub pose: f64,
-    /// Rate after less rate before, m/s or rad/s.
-    pub rate: f64,
-}
-
 /// A = π/72, mrad.
 const AMPLITUDE: f64 = PI / 72.0;
 /// The same as printed by the paper as an offset.
@@ -77,8 +64,6 @@ const PRINTED_OFFSET: f64 = 0.0436;
 const SHIFT: f64 = 1.918_666;
 /// Relative slack with which a sample counts as one at a joint, because time is a rounded product.
 const SLACK: f64 = 1e-9;
-/// A smaller pose difference at a joint is rounding, not a jump: 1 pm, 1 prad.
-const ROUNDING: f64 = 1e-12;
 /// µm and mrad.
 const UNITS: [f64; 6] = [1e-6, 1e-6, 1e-6, 1e-3, 1e-3, 1e-3];
 
@@ -155,31 +140,6 @@ impl PaperPose {
         let of = |part: fn(Jet) -> f64| core::array::from_fn(|axis| part(jets[axis]) * UNITS[axis]);
         PoseTarget { pose: of(|j| j.value), rate: of(|j| j.rate), acceleration: of(|j| j.acceleration) }
     }
-
-    /// Every jump of pose or slope, in the order of time and axis, including start and end, where the slope jumps from
-    /// and to rest.
-    #[must_use]
-    pub fn jumps(&self) -> Vec<Jump> {
-        let ends = self.ends();
-        let mut jumps = Vec::new();
-        for joint in 0..=ends.len() {
-            let time = if joint == 0 { 0.0 } else { ends[joint - 1] / self.time_factor() };
-            let before = joint.checked_sub(1).map(|piece| self.target_of(piece, time));
-            let after = if joint < ends.len() {
-                self.target_of(joint, time)
-            } else {
-                PoseTarget { pose: before.unwrap_or_default().pose, ..PoseTarget::default() }
-            };
-            let before = before.unwrap_or_default();
-            for axis in 0..6 {
-                let (pose, rate) = (after.pose[axis] - before.pose[axis], after.rate[axis] - before.rate[axis]);
-                if pose.abs() > ROUNDING || rate.abs() > ROUNDING * self.time_factor() {
-                    jumps.push(Jump { time, axis, pose, rate });
-                }
-            }
-        }
-        jumps
-    }
 }
 
 fn case_2(piece: usize, first: Jet, s: Jet, phase: Jet, offset: f64) -> [Jet; 6] {
@@ -233,6 +193,48 @@ impl PoseTrajectory for PaperPose {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// A smaller pose difference at a joint is rounding, not a jump: 1 pm, 1 prad.
+    const ROUNDING: f64 = 1e-12;
+
+    /// Where a trajectory is not smooth.
+    #[derive(Debug, Clone, Copy, PartialEq)]
+    struct Jump {
+        /// s from the start.
+        time: f64,
+        /// 0 to 5: x, y, z, θx, θy, θz.
+        axis: usize,
+        /// Pose after less pose before, m or rad.
+        pose: f64,
+        /// Rate after less rate before, m/s or rad/s.
+        rate: f64,
+    }
+
+    impl PaperPose {
+        /// Every jump of pose or slope, in the order of time and axis, including start and end, where the slope jumps from
+        /// and to rest.
+        fn jumps(&self) -> Vec<Jump> {
+            let ends = self.ends();
+            let mut jumps = Vec::new();
+            for joint in 0..=ends.len() {
+                let time = if joint == 0 { 0.0 } else { ends[joint - 1] / self.time_factor() };
+                let before = joint.checked_sub(1).map(|piece| self.target_of(piece, time));
+                let after = if joint < ends.len() {
+                    self.target_of(joint, time)
+                } else {
+                    PoseTarget { pose: before.unwrap_or_default().pose, ..PoseTarget::default() }
+                };
+                let before = before.unwrap_or_default();
+                for axis in 0..6 {
+                    let (pose, rate) = (after.pose[axis] - before.pose[axis], after.rate[axis] - before.rate[axis]);
+                    if pose.abs() > ROUNDING || rate.abs() > ROUNDING * self.time_factor() {
+                        jumps.push(Jump { time, axis, pose, rate });
+                    }
+                }
+            }
+            jumps
+        }
+    }
 
     const PATHS: [PaperPath; 3] = [PaperPath::Case1, PaperPath::Case2, PaperPath::Machining];
     const FREQUENCIES: [f64; 3] = [0.1, 1.0, 10.0];

@@ -51,7 +51,7 @@ fn every_mode_is_damped_within_the_bounds_of_the_design() {
 fn disturbed(bench: &Bench) -> [f64; 3] {
     const FAR: f64 = 10e-6;
     const REST: usize = 10_000;
-    let part = WorkPart { stiffness: [1.0 / FAR, 0.0, 0.0], tip: [0.0; 3], one_sided: false };
+    let part = WorkPart { stiffness: [1.0 / FAR, 0.0, 0.0], tip: [0.0; 3] };
     let mut controller = bench.controller();
     let mut prepared = bench.scenario().rig().clone();
     let mut rig = Rig::new(&mut prepared, &mut controller, PERIOD, 0).unwrap();

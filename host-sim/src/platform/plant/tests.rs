@@ -250,17 +250,17 @@ fn a_pre_cycle_in_long_steps_leaves_the_legs_where_small_steps_do() {
 }
 
 #[test]
-fn a_part_that_may_let_go_is_met_in_small_steps_and_left_in_long_ones() {
+fn a_disturbed_platform_is_in_small_steps_and_afterwards_in_long_ones() {
     let mut long = prepared(&Specimen::reference());
     let mut small = long.clone();
     long.step_whole_ticks(1e-4);
     for plant in [&mut long, &mut small] {
-        plant.touch(WorkPart { one_sided: true, ..WorkPart::glass() });
+        plant.disturb(&Wrench { force: [10.0, -20.0, 30.0], torque: [0.1, 0.2, -0.3] });
         driven(plant, 100);
     }
     assert_eq!(long.pose().map(f64::to_bits), small.pose().map(f64::to_bits));
     assert!(long.long.is_none());
-    long.release();
+    long.disturb(&Wrench::default());
     driven(&mut long, 1);
     assert!(long.long.is_some());
     long.step_small();

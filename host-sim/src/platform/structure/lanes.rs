@@ -34,7 +34,7 @@ pub(in crate::platform) struct StructureLanes {
     damping: Lane,
     /// Columns of J at rest.
     jacobian: [Lane; 6],
-    /// A contact that never opens, with its stiffness in coordinates h.
+    /// A contact, with its stiffness in coordinates h.
     contact: Option<(Contact, Matrix6)>,
     state: Column,
     displacement: Lane,
@@ -48,10 +48,9 @@ fn lane(of: impl Fn(usize) -> f64) -> Lane {
 }
 
 impl StructureLanes {
-    /// Copies the structure, for steps of `step` (s); `lag` of each leg's amplifier, s. None if a contact may open, or
-    /// if there is a disturbance.
+    /// Copies the structure, for steps of `step` (s); `lag` of each leg's amplifier, s. None if there is a disturbance.
     pub(in crate::platform) fn of(structure: &Structure, step: f64, lag: &Lane) -> Option<Self> {
-        if structure.disturbance.is_some() || structure.contact.is_some_and(|contact| contact.part.one_sided) {
+        if structure.disturbance.is_some() {
             return None;
         }
         let parameters = &structure.parameters;
@@ -230,7 +229,7 @@ impl StructureLanes {
         }
         if let Some((contact, stiffness)) = &self.contact {
             let pose = self.pose();
-            let pushed = contact.wrench_when_closed(&pose).generalised(&rate_matrix(angles(&pose)));
+            let pushed = contact.wrench(&pose).generalised(&rate_matrix(angles(&pose)));
             let spring = apply(stiffness, &pose);
             for k in 0..6 {
                 out[k] += pushed[k] + spring[k];
