@@ -4,7 +4,7 @@
 use crate::figures;
 use host_sim::controller::TickController;
 use host_sim::description::Description;
-use host_sim::stimulus::InputRecording;
+use oracle::stimulus::InputRecording;
 use specgen::model::Mcu;
 use specgen::target::{Image, image, stack};
 use specgen::verify::{self, Measurement};

@@ -7,8 +7,8 @@ use std::collections::BTreeSet;
 use std::fs;
 
 use host_sim::controller::TickController;
-use host_sim::stimulus::InputRecording;
 use host_sim::trace::{Difference, Trace, first_difference};
+use oracle::stimulus::InputRecording;
 use specgen::compile::Compilation;
 use specgen::model::Mcu;
 use specgen::target::Image;

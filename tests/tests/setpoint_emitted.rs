@@ -170,7 +170,7 @@ fn set_points_stay_within_their_instructions() {
             row[rate] = description.scalar.encode(if kind == 1 { 30e-6 } else { 0.0 });
             words.extend(row);
         }
-        let inputs = host_sim::stimulus::InputRecording { width: description.input_names.len(), words };
+        let inputs = oracle::stimulus::InputRecording { width: description.input_names.len(), words };
         let (host, config) = specgen_tests::host_trace(&mut controller, &[], &inputs);
         let m = specgen::verify::measure(&image, &config, &host).unwrap();
         assert_eq!(m.first_difference, None, "{name}");

@@ -2,8 +2,8 @@
 
 use host_sim::controller::{Controller, RestingReadings, Supervised, TickController as _};
 use host_sim::description::Description;
-use host_sim::stimulus::platform::{self as platform_stimulus, PlatformInputs};
-use host_sim::stimulus::{self, Setpoints};
+use oracle::stimulus::platform::{self as platform_stimulus, PlatformInputs};
+use oracle::stimulus::{self, Setpoints};
 use specgen_compiler::compile::Compilation;
 use specgen_ir::{Ir, Path, Range};
 use specgen_runtime::Digest;

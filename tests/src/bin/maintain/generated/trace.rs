@@ -17,7 +17,7 @@ use specgen_language::spec;
 
 /// Hand-written code and its tests.
 const SOURCES: [&str; 6] =
-    ["firmware/runtime", "firmware/law", "codegen", "host-sim/src", "host-sim/oracle", "tests/tests"];
+    ["firmware/runtime", "firmware/law", "codegen", "host-sim/src", "tests/oracle", "tests/tests"];
 /// Emitted controllers: of the platform kind and of the kind of six legs.
 const EMITTED: [&str; 2] = ["firmware/controller/src", "tests/golden/six-records/src"];
 /// Excluded: the emitters contain the text of the emitted lines.

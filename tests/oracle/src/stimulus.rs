@@ -9,8 +9,8 @@ pub mod platform;
 
 use draw::RandomSource;
 
-use crate::closed_loop::LEGS;
-use crate::description::{Description, DescriptionError};
+use host_sim::closed_loop::LEGS;
+use host_sim::description::{Description, DescriptionError};
 
 /// Meaning of the six set-point words.
 #[derive(Debug, Clone, PartialEq)]
@@ -249,8 +249,11 @@ mod tests {
 
     use super::draw::specials;
     use super::*;
-    use crate::description::tests::six_legs;
-    use crate::word::Scalar;
+    use host_sim::word::Scalar;
+
+    fn six_legs(scalar: Scalar) -> Description {
+        Description { scalar, ..crate::description() }
+    }
 
     /// N = 32; E depends on d = i − j alone: d (32 + d)/2048 of 60 µm.
     fn everett() -> Vec<Vec<f64>> {

@@ -5,7 +5,7 @@ use core::f64::consts::TAU;
 
 use super::draw::RandomSource;
 use super::{InputRecording, in_stretches};
-use crate::description::{Description, DescriptionError};
+use host_sim::description::{Description, DescriptionError};
 
 /// Words of the command.
 const COMMAND: [&str; 3] = ["command", "selector", "sequence"];
@@ -205,8 +205,8 @@ impl<'a> Generator<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::description::indexed;
-    use crate::word::Scalar;
+    use host_sim::description::indexed;
+    use host_sim::word::Scalar;
 
     fn description() -> Description {
         Description {

@@ -1,8 +1,8 @@
 //! Feeds recorded inputs to a controller: the host's side of the bit-identity check.
 
-use crate::controller::TickController;
 use crate::stimulus::InputRecording;
-use crate::trace::Trace;
+use host_sim::controller::TickController;
+use host_sim::trace::Trace;
 
 /// Runs `controller`, reset to power-up and configured as it is, over recorded inputs; one row of trace per row of input.
 ///
@@ -22,15 +22,14 @@ pub fn replay(controller: &mut dyn TickController, recording: &InputRecording) -
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::controller::StandIn;
-    use crate::description::tests::six_legs;
+    use crate::description;
     use crate::stimulus::{Setpoints, record};
-    use crate::trace::first_difference;
-    use crate::word::Scalar;
+    use host_sim::controller::StandIn;
+    use host_sim::trace::first_difference;
 
     fn trace(constant: u64) -> Trace {
         let setpoints = Setpoints::Leg { stroke: 6e-5, everett: vec![vec![0.0], vec![6e-5, 0.0]] };
-        let description = six_legs(Scalar::F64);
+        let description = description();
         let recording = record(&description, &setpoints, 2000, 5).unwrap();
         // Adds its inputs' bits, scaled by one constant: every bit of history shows in its digest.
         let tick = |sum: &mut u64, input: &[u64], output: &mut [u64]| {
@@ -53,7 +52,7 @@ mod tests {
     fn the_trace_holds_the_recording() {
         let trace = trace(1);
         assert_eq!(trace.len(), 2000);
-        let digests: Vec<u64> = trace.rows().map(|row| row[49]).collect();
+        let digests: Vec<u64> = trace.rows().map(|row| row[42]).collect();
         assert!(digests.windows(2).all(|pair| pair[0] != pair[1]));
     }
 }
