@@ -84,7 +84,7 @@ fn a_machine_that_is_not_its_spec_learns_with_its_own_response() {
         let blind = on(bench, leg, off, |machine| learned(machine, &model, &usual, 6));
         let (heard, convergence, own) = on(bench, leg, off, |machine| {
             let response = measured(machine, &model);
-            let heard = model.heard(&response);
+            let heard = model.mode_measurements(&response);
             let with = Learnable::of(compiled).unwrap().with(Response::read(&response.to_json()).unwrap());
             let convergence = with.convergence(&Factors::of(&compiled.model, &[]), WISH).unwrap();
             let own = learned(machine, &with, &convergence, 6);
