@@ -1,4 +1,4 @@
-//! A simulated machine behind its sensors and amplifiers, whatever stands on its legs.
+//! A simulated machine with its sensors and amplifiers: a platform or six separate legs.
 
 use crate::closed_loop::{LEGS, Rig};
 use crate::platform::PlatformRig;

@@ -94,11 +94,14 @@ impl ControlMode {
 /// As users write it, such as `P/F pcc`.
 impl fmt::Display for ControlMode {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::P => f.write_str("P"),
-            Self::F(law) => write!(f, "F {}", law.name()),
-            Self::PF(law) => write!(f, "P/F {}", law.name()),
-        }
+        let (loops, law) = match self {
+            Self::P => return f.write_str("P"),
+            Self::F(law) => ("F ", law),
+            Self::PF(law) => ("P/F ", law),
+        };
+        // Not `write!`: its formatting has a panic path.
+        f.write_str(loops)?;
+        f.write_str(law.name())
     }
 }
 
