@@ -282,13 +282,13 @@ fn paths_out_of_reach_too_fast_or_too_slow_for_the_ticks_are_refused() {
     };
     // z reaches 40 µm, 50 with the bias.
     let (code, message) = refused(|model| model.workspace.translation[2] = 49e-6);
-    assert!(code == "E0454" && message.contains("z at 50.000 um after 2.500000 s"), "{code} {message}");
+    assert!(code == "E0454" && message.contains("z is 50.000 um after 2.500000 s"), "{code} {message}");
     let (code, message) = refused(|model| model.task_space.as_mut().unwrap().setpoint.stream_speed[1] = 50e-6);
     assert!(code == "E0455" && message.contains("y moves at"), "{code} {message}");
     let (code, _) = refused(|model| model.timing.period = 0.6);
     assert_eq!(code, "E0456");
     let (code, message) = refused(|model| model.task_space.as_mut().unwrap().setpoint.bias[0] = 60e-6);
-    assert!(code.starts_with("E0450") && message.contains("the bias pose puts x at 60.000 um"), "{code} {message}");
+    assert!(code.starts_with("E0450") && message.contains("the bias pose has x = 60.000 um"), "{code} {message}");
     let (code, message) = refused(|model| model.task_space.as_mut().unwrap().setpoint.speed[4] = 1e-9);
     assert!(code == "E0451" && message.contains("more than 210 s"), "{code} {message}");
     let (code, message) = refused(|model| model.task_space.as_mut().unwrap().frames.work[0] = 12e-3);

@@ -1,4 +1,4 @@
-//! What the design gives, refuses and points out.
+//! Tests of the design: its values, refusals and warnings.
 
 use specgen_compiler::stability::platform::{Design, Tuning, describe, design};
 use specgen_language::model::{AdaptationMode, Gains, Interaction, Model, TaskSpace};
@@ -63,7 +63,7 @@ fn given_values_are_checked_and_not_changed() {
     assert_eq!(mixed.combined.level_bandwidth, rule.combined.level_bandwidth);
 }
 
-/// The factor in "… × F is stable" or "F times what is given".
+/// The factor in "… × F is stable" or "F times the given value".
 fn offered(help: &str) -> f64 {
     let number = |text: &str| text.trim().split(' ').next().unwrap().parse().unwrap();
     help.split_once('×').map_or_else(|| number(help.split_once("is stable, ").unwrap().1), |(_, after)| number(after))
@@ -85,7 +85,7 @@ fn unstable_numbers_are_refused_at_their_key_and_what_is_offered_is_accepted() {
         assert!(found[0].key.starts_with("adaptation.level_"), "{}", found[0].key);
         let accepted = offered(&found[0].help) * factor;
         assert!(with(accepted).is_ok(), "× {accepted}: {}", found[0].help);
-        assert!(with(1.07 * accepted).is_err(), "the offer is near the largest: {accepted}");
+        assert!(with(1.07 * accepted).is_err(), "the suggestion is near the largest: {accepted}");
         // Gains of P/F.
         let with = |scale: f64| designed(|_, task| task.gains = Some(gains_of(&rule.combined.scaled(scale, 1.0))));
         let found = with(5.0 * factor).unwrap_err();
@@ -102,7 +102,7 @@ fn unstable_numbers_are_refused_at_their_key_and_what_is_offered_is_accepted() {
         let accepted = offered(&found[0].help) * factor;
         assert!(with(accepted).is_ok() && with(1.07 * accepted).is_err(), "× {accepted}: {}", found[0].help);
     }
-    // All three at once: every offer taken gives an accepted spec.
+    // All three together: a spec with all suggested values is accepted.
     let with = |scale: [f64; 3]| {
         designed(|_, task| {
             task.adaptation =

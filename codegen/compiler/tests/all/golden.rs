@@ -1,5 +1,5 @@
-//! Every constant, margin and finding of many specs against committed text (`golden/`), so that a wrong number is seen at the
-//! field that it is in. Detects changes, proves nothing: what is right is for the tests of each module, and for those of `tests/`.
+//! Compares every constant, margin and finding of many specs with committed text (`golden/`), so that a wrong number is reported with
+//! its field. This detects changes but does not prove correctness: that is left to the tests of each module and those in `tests/`.
 
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
@@ -23,7 +23,7 @@ mod cases;
 #[path = "../../../../tests/src/cases.rs"]
 mod rules;
 
-/// Specs below `specs/`: both kinds of controller first, each written in full; of the others, what is not as in these.
+/// Specs below `specs/`: first one of each kind of controller, written in full; of the others only the differences.
 const SPECS: [&str; 19] = [
     "reference.toml",
     "legs.toml",
@@ -45,9 +45,9 @@ const SPECS: [&str; 19] = [
     "features/run-interval.toml",
     "features/six-records.toml",
 ];
-/// How many of them are written in full.
+/// Number of specs that are written in full.
 const IN_FULL: usize = 2;
-/// Specs that slips are made in, and by what each line's numbers are then multiplied.
+/// Specs with slips, and the factors for the numbers of each line.
 const SLIPPED: [&str; 3] = ["reference.toml", "legs.toml", "features/platform-calibration.toml"];
 const FACTORS: [f64; 5] = [-1.0, 1e-3, 0.3, 10.0, 1e3];
 /// A line of numbers longer than this is written as its digest.
@@ -62,7 +62,7 @@ fn read(name: &str) -> SpecSource {
     SpecSource { display_name: name.to_owned(), ..SpecSource::read(&path).unwrap() }
 }
 
-/// A committed text that is written anew, line by line, and stops at the first that differs; SPECGEN_BLESS=1 keeps it.
+/// A committed text that is regenerated line by line and fails at the first difference; SPECGEN_BLESS=1 replaces it.
 struct Golden {
     file: &'static str,
     committed: Vec<String>,
@@ -103,7 +103,7 @@ impl Golden {
     }
 }
 
-/// One line for each field, with every bit of its numbers: the shortest text that is read back as the same number.
+/// One line for each field with exact numbers: the shortest text that reads back to the same number.
 fn fields(path: &str, value: &Value, lines: &mut Vec<String>) {
     match value {
         Value::Object(map) => map.iter().for_each(|(key, value)| fields(&format!("{path}.{key}"), value, lines)),
@@ -130,15 +130,15 @@ fn digest(text: &str) -> String {
     digest
 }
 
-/// What a spec compiles to.
+/// Result of compiling a spec.
 struct GoldenOutput {
     ir: Ir,
-    /// Margins, demands of the trajectories and lengths of the stops, noise of the pose.
+    /// Margins, demands of the trajectories, stopping distances, noise of the pose.
     figures: Value,
     findings: Vec<Diagnostic>,
 }
 
-/// A table that no record has to be identified for: uneven, so that no two nodes are the same.
+/// A table without an identified record: uneven, so that no two nodes are equal.
 fn table(model: &Model, scale: f64) -> EverettTable {
     let (grid, [min, max]) = (model.hysteresis.grid, model.actuator.voltage);
     let share = |k: usize| k as f64 / grid as f64;
@@ -163,8 +163,8 @@ fn waveforms(source: &SpecSource, model: &Model, table: Option<&str>) -> Vec<Opt
         .collect()
 }
 
-/// The phases of the compiler that this crate computes in, without reading records and without emitting; with
-/// a table of poses, where the spec names one.
+/// The phases of the compiler in this crate, without reading records and without emitting; with a table of poses, if the spec
+/// references one.
 fn build(source: &SpecSource, table_of_poses: Option<&str>) -> Result<GoldenOutput, Vec<Diagnostic>> {
     let (model, _) = spec::load_as_far(source);
     let Some(model) = model else { return Err(Vec::new()) };
@@ -226,7 +226,7 @@ fn build(source: &SpecSource, table_of_poses: Option<&str>) -> Result<GoldenOutp
     Ok(GoldenOutput { ir, figures, findings })
 }
 
-/// One after the other: for a mutant, the first difference is enough.
+/// In one test: for a mutant, the first difference is enough.
 #[test]
 fn specs_compile_to_what_is_committed() {
     boundaries();
@@ -258,7 +258,7 @@ fn constants() {
     golden.end();
 }
 
-/// A finding with all its words and what stands in the spec at its place.
+/// A finding with its complete text, and the text of the spec at its place.
 fn line(source: &SpecSource, finding: &Diagnostic) -> String {
     assert_numbers(source, finding);
     let Diagnostic { severity, code, key, place, message, help, .. } = finding;
@@ -269,7 +269,7 @@ fn line(source: &SpecSource, finding: &Diagnostic) -> String {
     format!("{severity:?} {code} {key} at {place}: {message}; {help}")
 }
 
-/// What is refused or warned of.
+/// Errors and warnings.
 fn refusals() {
     let (mut golden, mut known) = (Golden::open("refusals.txt"), BTreeSet::new());
     let (of_parts, of_paths) = (cases::OF_PARTS.iter(), cases::OF_PATHS.iter());
@@ -303,7 +303,7 @@ fn refusals() {
     golden.end();
 }
 
-/// The text with the first so many of its trajectories.
+/// The text with only the first `count` trajectories.
 fn with_trajectories(text: &str, count: usize) -> String {
     const BEGIN: &str = "[[trajectory]]";
     let at: Vec<usize> = text.match_indices(BEGIN).map(|(at, _)| at).collect();
@@ -313,7 +313,7 @@ fn with_trajectories(text: &str, count: usize) -> String {
     }
 }
 
-/// What the physical lint says at the boundary of each rule.
+/// Findings of the physical lint at the boundary of each rule.
 fn boundaries() {
     let mut golden = Golden::open("boundaries.txt");
     for (rule, _) in rules::read(&root().join("tests/cases/lint_boundaries.txt")) {
@@ -344,12 +344,12 @@ fn said(source: &SpecSource) -> BTreeSet<String> {
     model.iter().flat_map(lint::check).map(|finding| line(source, &finding)).collect()
 }
 
-/// What it says about slips.
+/// Findings of the physical lint about slips.
 fn slipped() {
     let mut golden = Golden::open("slips.txt");
     for name in SLIPPED {
         let source = read(name);
-        golden.line(format!("# {name}: line, factor, codes and digest of what the physical lint says"));
+        golden.line(format!("# {name}: line, factor, codes and digest of the findings of the physical lint"));
         for factor in FACTORS {
             for (at, slip) in slips(&source.text, factor) {
                 let source = SpecSource { text: slip, ..source.clone() };
@@ -395,14 +395,14 @@ fn multiplied(value: &str, factor: f64) -> Option<String> {
     any.then_some(changed)
 }
 
-/// Whether a word is `NaN`, `inf`, or less than nothing, such as `-0.00`.
+/// Whether a word is `NaN`, `inf`, or negative zero, such as `-0.00`.
 fn is_no_number(word: &str) -> bool {
     let word = word.trim_matches(|letter: char| !letter.is_alphanumeric() && letter != '-').trim_end_matches('-');
     let number = word.parse::<f64>();
     number.is_ok_and(|number| !number.is_finite() || (number == 0.0 && number.is_sign_negative()))
 }
 
-/// A number in a text is a number, in message and help of a finding.
+/// Checks that message and help of a finding contain no such word.
 fn assert_numbers(source: &SpecSource, finding: &Diagnostic) {
     let text = format!("{} {}", finding.message, finding.help);
     // Words of a message, and its quoted values.
@@ -420,7 +420,7 @@ fn a_word_that_is_no_number_is_known() {
     }
 }
 
-/// All that is found before anything is emitted, of specs with the numbers of one line multiplied, by nothing, too.
+/// All findings before emission, of specs with the numbers of one line multiplied, also by zero.
 #[test]
 fn no_finding_says_a_number_that_is_none() {
     let full = std::env::var_os("SPECGEN_FULL").is_some();
@@ -430,14 +430,14 @@ fn no_finding_says_a_number_that_is_none() {
         (&["features/platform-calibration.toml"], &[0.0])
     };
     let mut sources: Vec<SpecSource> = specs.iter().map(|name| read(name)).collect();
-    // A gauge that is far too wide and without noise, of which nothing is a multiple.
+    // A gauge with far too wide a range and zero noise, of which nothing is a multiple.
     let silent = read("minimal.toml");
     let wide = silent.text.replacen("[\"-2 um\", \"48 um\"]", "[\"-300 um\", \"300 um\"]", 1);
     assert_ne!(wide, silent.text);
     sources.push(SpecSource { text: wide, ..silent });
     let mut count = 0;
     for (index, source) in sources.into_iter().enumerate() {
-        // Specs share most of their lines: each gets every second factor, and the next spec the others.
+        // Specs share most of their lines: each gets every second factor, the next spec the others.
         let due = |at: usize, factor: usize| !full || (index + at + factor).is_multiple_of(2);
         let slips = (0..factors.len()).flat_map(|factor| {
             slips(&source.text, factors[factor]).into_iter().filter(move |(at, _)| due(*at, factor))

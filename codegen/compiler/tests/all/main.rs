@@ -1,7 +1,7 @@
-//! Constants, margins and findings against committed text. Design and stability of the platform loop against the study's figures,
-//! and against a simulation that shares nothing with it.
+//! Compares constants, margins and findings with committed text, and design and stability of the platform loop with the study's
+//! figures and with an independent simulation.
 
-#![allow(clippy::disallowed_methods, reason = "what stands in a test is emitted nowhere")]
+#![allow(clippy::disallowed_methods, reason = "tests are not emitted")]
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // Helpers of tests, where a panic is a failed test.
 
 mod design;
@@ -19,7 +19,7 @@ use specgen_compiler::stability::platform::{
 use specgen_runtime::{ControlMode, Law};
 use study::{model, rest};
 
-/// How much of what only gains by length is run: the long length in the full run.
+/// Length of a test that benefits from more data: `long` in the full test run.
 fn length<T>(short: T, long: T) -> T {
     if std::env::var_os("SPECGEN_FULL").is_some() { long } else { short }
 }
@@ -28,7 +28,7 @@ const EWMA: ControlMode = ControlMode::F(Law::Ewma);
 const PCC: ControlMode = ControlMode::F(Law::Pcc);
 const COMBINED: ControlMode = ControlMode::PF(Law::Pcc);
 
-/// First crossing of radius 1 along a factor, by a scan and bisection of its own.
+/// First crossing of radius 1 along a factor, by an independent scan and bisection.
 fn limit(low: f64, high: f64, radius: impl Fn(f64) -> f64) -> f64 {
     let mut good = low;
     while good < high {
@@ -54,7 +54,7 @@ fn loop_at(rate: f64, damping: f64, notch: Option<f64>) -> ClosedLoop {
     closed_loop_of(&model, &task, &rest()).unwrap()
 }
 
-/// k_p/K, k_I/K, Ω1, Ω2 of the study's bases at 10 kHz, and whether the notch is in.
+/// k_p/K, k_I/K, Ω1, Ω2 of the study's bases at 10 kHz, and whether there is a notch.
 fn base(name: &str) -> (Tuning, ClosedLoop) {
     let ([kp, ki, level, drift], notch) = match name {
         "U" => ([0.005, 20.0, 40.0, 1.75], None),
@@ -161,8 +161,8 @@ fn margins_of_the_study_s_hand_gains_are_found_again() {
     agrees("softer", softer, 0.44, 0.02, 0.005);
 }
 
-/// k_v = M V diag(2 ζ_a ω) Vᵀ M has this diagonal for ζ_a = 0.1 (study): unstable at 2 kHz, stable at 10 kHz, and not with
-/// a tick of delay on top where ζ_a is 0.25.
+/// k_v = M V diag(2 ζ_a ω) Vᵀ M has this diagonal for ζ_a = 0.1 (study): unstable at 2 kHz, stable at 10 kHz, and unstable with
+/// an additional tick of delay if ζ_a is 0.25.
 #[test]
 fn damping_by_velocity_needs_a_fast_loop_without_delay() {
     let kv = |factor: f64| Tuning {
@@ -177,7 +177,7 @@ fn damping_by_velocity_needs_a_fast_loop_without_delay() {
     assert!(radius(1e4, 1.0, 0.0) < 1.0);
     assert!(radius(2e3, 1.0, 0.0) > 1.0);
     assert!(radius(1e4, 2.5, 0.0) < 1.0 && radius(1e4, 2.5, 1.0) > 1.0);
-    // The bandwidth that F may have beside it, rad/s: more than four times 143 at 10 kHz.
+    // The possible bandwidth of F with it, rad/s: more than four times 143 at 10 kHz.
     let crossover = |rate: f64, factor: f64, delay: f64| {
         let closed_loop = loop_at(rate, 0.02, None);
         limit(20.0, 5e3, |level| {
@@ -188,7 +188,7 @@ fn damping_by_velocity_needs_a_fast_loop_without_delay() {
     };
     let found =
         [crossover(1e4, 1.5, 0.0), crossover(1e4, 2.5, 0.0), crossover(1e4, 0.5, 1.0), crossover(1e4, 0.84, 1.0)];
-    // The study feeds the full matrix back and filters at 3 to 4 kHz, so this is no more than a likeness.
+    // The study feeds the full matrix back and filters at 3 to 4 kHz, so the agreement is only approximate.
     for (found, expected) in found.into_iter().zip([691.0, 1088.0, 330.0, 436.0]) {
         agrees("crossover with k_v", found, expected, 0.08, 0.0);
     }
@@ -223,7 +223,7 @@ fn run_of(closed_loop: &ClosedLoop, law: ControlMode, tuning: &Tuning, condition
     }
 }
 
-/// Finds the limit along `factor` and asks the simulation 5 % below and above it.
+/// Finds the limit along `factor` and simulates 5 % below and above it.
 fn limit_holds_in_simulation(
     what: &str,
     closed_loop: &ClosedLoop,
@@ -333,7 +333,7 @@ fn the_radius_is_continuous_in_the_delay() {
         let below = (radius(whole + 1.0 - 1e-9) - radius(whole + 1.0)).abs();
         assert!(below < 1e-7, "{whole}: {below:e}");
     }
-    assert!(radius(3.0) > radius(2.0) && radius(2.0) > radius(1.0), "a loop at its limit minds a delay");
+    assert!(radius(3.0) > radius(2.0) && radius(2.0) > radius(1.0), "a delay matters for a loop at its limit");
 }
 
 #[test]
@@ -348,7 +348,7 @@ fn beyond_a_limit_the_radius_grows_with_gain_and_weight() {
     }
 }
 
-/// A platform without any symmetry: no two modes uncoupled, nothing falls into blocks.
+/// A platform without any symmetry: all modes are coupled.
 fn asymmetric() -> RestDynamics {
     let mut rest = rest();
     for (i, row) in rest.jacobian.iter_mut().enumerate() {

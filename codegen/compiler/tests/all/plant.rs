@@ -1,6 +1,6 @@
-//! The spectral radius against what loops on the simulator's own plants do: how fast a kick grows. Gauges lag in both.
+//! Compares the spectral radius with loops on the simulator's own plants: the growth of a kick. Gauges lag in both.
 //!
-//! The plants get linear stacks here: one play without threshold, no creep, no asymmetry.
+//! The plants have linear stacks: one play without threshold, no creep, no asymmetry.
 
 use std::f64::consts::TAU;
 
@@ -12,11 +12,11 @@ use specgen_compiler::stability::{LegDynamics, spectral_radius};
 
 use super::{EWMA, loop_at};
 
-/// V at which everything rests.
+/// Voltage at rest, V.
 const REST: f64 = 50.0;
-/// Growth of a tick that is looked at: unstable, and slowly.
+/// Growth per tick in the test: slowly unstable.
 const GROWTH: f64 = 1.003;
-/// Ticks of a window, and from its beginning to that of the next.
+/// Ticks of a window, and between the starts of two windows.
 const WINDOW: usize = 500;
 const APART: usize = 1500;
 
@@ -35,7 +35,7 @@ fn linear_leg(gauge_lag: f64) -> LegParameters {
     }
 }
 
-/// Growth per tick of a signal that ticks produce, from the rms of two windows.
+/// Growth per tick of a signal, from the rms of two windows.
 fn growth(mut tick: impl FnMut() -> f64) -> f64 {
     let signal: Vec<f64> = (0..1000 + APART + WINDOW).map(|_| tick()).collect();
     let size = |from: usize| signal[from..from + WINDOW].iter().map(|x| x * x).sum::<f64>().sqrt();

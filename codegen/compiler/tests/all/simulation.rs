@@ -10,7 +10,7 @@ pub struct Run {
     pub rate: f64,
     pub damping: f64,
     pub lag: f64,
-    /// Of the gauges, s; 0: none.
+    /// Lag of the gauges, s; 0: none.
     pub gauge_lag: f64,
     pub axial_stiffness: f64,
     pub notch: Option<f64>,
@@ -23,7 +23,7 @@ pub struct Run {
     pub velocity_cutoff: f64,
     pub level_weight: f64,
     pub drift_weight: f64,
-    /// Diagonal stiffness of a work piece that is touched, and whether its force is measured and fed forward.
+    /// Diagonal stiffness of a touched work piece, and whether its force is measured and fed forward.
     pub contact: [f64; 6],
     pub measured: bool,
     pub seconds: f64,
@@ -84,7 +84,7 @@ struct Plant {
     gauge_lag: f64,
 }
 
-/// Pose, its rate, leg displacements that the amplifiers drive, pose that gauges with a lag show.
+/// Pose, its rate, leg displacements driven by the amplifiers, and the pose measured by gauges with lag.
 type State = (Vector6<f64>, Vector6<f64>, Vector6<f64>, Vector6<f64>);
 
 impl Plant {
@@ -147,7 +147,7 @@ pub fn settles(run: &Run, rest: &RestDynamics) -> bool {
     let mut state: State = (kick, Vector6::zeros(), Vector6::zeros(), kick);
     let (mut level, mut drift, mut sum) = (Vector6::zeros(), Vector6::zeros(), Vector6::zeros());
     let (mut last_pose, mut velocity) = (state.0, Vector6::zeros());
-    // q̂ − p of the interval that just ended; requests on their way.
+    // q̂ − p of the last interval; delayed requests.
     let mut known = Vector6::zeros();
     let mut line = vec![Vector6::<f64>::zeros(); run.delay as usize + 1];
     let ticks = (run.seconds * run.rate) as usize;
@@ -178,7 +178,7 @@ pub fn settles(run: &Run, rest: &RestDynamics) -> bool {
         let request = load + feedback - level - drift;
         known = request - load;
         line.push(request);
-        // The first part of the interval is still under the request before.
+        // The first part of the interval still has the previous request.
         let (older, newer) = (line[0] * run.gain_ratio, line[1] * run.gain_ratio);
         line.remove(0);
         let part = run.delay.fract();

@@ -23,13 +23,13 @@ pub fn rest() -> RestDynamics {
         [-0.5465394147818659, -0.1978476274045404, 0.8137266029940828, 0.07122514586563454, 0.03935083786429434, 0.057406036960214755],
         [0.44461077880174316, 0.374393203668306, 0.8137266029940828, 0.06969139818349875, 0.04200736677574452, -0.057406036960214755],
     ];
-    // The other three legs are these mirrored in y.
+    // The other three legs mirror these in y.
     let mirror = |[a, b, c, d, e, f]: [f64; 6]| [a, -b, c, -d, e, -f];
     let jacobian = [half[0], half[1], half[2], mirror(half[2]), mirror(half[1]), mirror(half[0])];
     RestDynamics { mass, jacobian }
 }
 
-/// The leg study's spec with a controller that sees the platform: 10 kHz, ζ 2 %, λ = 1, notch ζ_d = 1.
+/// The leg study's spec with a platform controller: 10 kHz, ζ 2 %, λ = 1, notch ζ_d = 1.
 pub fn model() -> (Model, TaskSpace) {
     let specs = Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(2).unwrap().join("specs");
     let read = |name: &str| spec::load(&SpecSource::read(&specs.join(name)).unwrap()).0.unwrap();

@@ -1,6 +1,6 @@
-//! Specs that are changed so far that something is refused or warned of.
+//! Changed specs that cause an error or a warning.
 
-/// A spec below `specs/`, texts in it that are replaced, and the rows of its table of poses.
+/// A spec below `specs/`, the replaced texts, and the rows of its table of poses.
 type Case = (&'static str, &'static [(&'static str, &'static str)], Option<fn(u32) -> String>);
 
 /// Columns of the tables.
@@ -106,7 +106,7 @@ pub const OF_PARTS: &[Case] = &[
     (REFERENCE, &[("[\"-55 um\", \"55 um\"]", "[\"-55 um\", \"0 um\"]")], None),
     (REFERENCE, &[("[\"-55 um\", \"55 um\"]", "[\"0 um\", \"55 um\"]")], None),
     (REFERENCE, &[("[\"-55 um\", \"55 um\"]", "[\"-25 um\", \"30 um\"]")], None),
-    // Gauges in a line with the centre but for the sign of one.
+    // Gauges in line with the centre except for the sign of one.
     (REFERENCE, &[("point     = [\"-80 mm\", \"0 mm\", \"180 mm\"]\ndirection = [0, 1, 0]", "point     = [\"-40 mm\", \"69.282 mm\", \"180 mm\"]\ndirection = [0.866, -0.5, 0]"), (LAST_GAUGE, "point     = [\"-40 mm\", \"-69.282 mm\", \"180 mm\"]\ndirection = [0.866, -0.5, 0]")], None),
     // Converters that begin below zero.
     (LEGS, &[("[\"0 V\", \"150 V\"]", "[\"-25.7 V\", \"150 V\"]"), ("[\"0 V\", \"100 V\"]", "[\"-11.3 V\", \"101.7 V\"]")], None),
@@ -146,7 +146,7 @@ pub const OF_PARTS: &[Case] = &[
 /// Paths and stops: the spec with the first of its trajectories.
 #[rustfmt::skip]
 pub const OF_PATHS: &[Case] = &[
-    // No two numbers alike, and none zero.
+    // No two numbers are equal, and none is zero.
     (
         FRAMES,
         &[
