@@ -42,7 +42,7 @@ fn a_converter_too_coarse_is_refused_with_the_bits_that_would_do() {
             let one = finding(&findings, codes::TOO_FEW_BITS);
             let Place::Spec(span) = &one.place else { panic!("{one:?}") };
             assert!(text[span.clone()].contains("nm") && one.key == "requirements.precision", "{one:?}");
-            assert!(one.help.contains(&format!("dac.bits = {bits} would be enough")), "{factor}: {}", one.help);
+            assert!(one.help.contains(&format!("dac.bits = {bits} is enough")), "{factor}: {}", one.help);
             // The bits that are named do, one fewer does not; so does the precision that is named.
             for (bits, good) in [(bits, true), (bits - 1, false)] {
                 let dac = format!("[dac]\nbits  = {bits}");

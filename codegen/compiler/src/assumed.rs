@@ -65,11 +65,7 @@ impl Assumptions {
             &model.spans,
             if self.values.is_empty() { &["hysteresis.records"] } else { &["assumed", "sensor"] },
             codes::ASSUMED_ON_BOARD,
-            format!(
-                "the controller of a real machine would be based on {}: {}",
-                self.summary(),
-                self.list().join(", ")
-            ),
+            format!("the controller of a real machine would rely on {}: {}", self.summary(), self.list().join(", ")),
             format!("{}; or accept them with --assumed-ok", clear.join(", and ")),
         )
     }

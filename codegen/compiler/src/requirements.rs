@@ -64,10 +64,7 @@ pub fn check(model: &Model) -> Result<(), Vec<Diagnostic>> {
         ),
         match enough {
             Some(bits) => {
-                format!(
-                    "dac.bits = {bits} would be enough; or use a `dac.range` of {range:.3} V, or allow {}",
-                    up(largest)
-                )
+                format!("dac.bits = {bits} is enough; or a `dac.range` of {range:.3} V, or allow {}", up(largest))
             }
             None => format!(
                 "no supported converter has enough bits: allow {}, or narrow `dac.range` to {range:.3} V",

@@ -435,11 +435,7 @@ fn leg_parts_against_platform(facts: &Facts, found: &mut Findings) {
             times_beyond(mass / platform, &SOUND_SHARE),
             LEG_MASS_ODD,
             &format!("leg.{part}_mass"),
-            format!(
-                "the {part} part of a leg has a mass of {} kg, the platform {} kg",
-                figure(*mass),
-                figure(platform)
-            ),
+            format!("the {part} part of a leg weighs {} kg, the platform {} kg", figure(*mass), figure(platform)),
             &format!("check the units of `leg.{part}_mass` and `platform.mass`: kg or g"),
         );
     }

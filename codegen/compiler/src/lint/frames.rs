@@ -99,8 +99,7 @@ fn other_frame(facts: &Facts, found: &mut Findings) {
         let z = pierced(probe, height)[2];
         let heights = heights_off(z, height).filter(|_| libm::fabs(probe.direction[2]) < ALONG_AXIS);
         if let Some(heights) = heights {
-            let mistake =
-                if heights > 0.0 { "measured from the platform" } else { "given with the height added twice" };
+            let mistake = if heights > 0.0 { "measured from the platform" } else { "given with the height twice" };
             let help = format!(
                 "a gauge's `point` is in {{B}}, whose origin is in the base, but here z seems to be {mistake}; also check its unit"
             );

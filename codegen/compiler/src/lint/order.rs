@@ -167,8 +167,7 @@ fn legs_cross(facts: &Facts, found: &mut Findings) {
     if !["base", "platform"].iter().any(|body| is_listed(facts, body)) {
         return;
     }
-    let help =
-        "`geometry.base_joints` and `geometry.platform_joints` must list the legs in the same order: check both lists";
+    let help = "`geometry.base_joints` and `geometry.platform_joints` must have the legs in the same order";
     let now = length(geometry, |k| k);
     let limit = now * (1.0 - CROSSED);
     let pairs: Vec<(usize, usize)> = (0..6).flat_map(|i| (i + 1..6).map(move |j| (i, j))).collect();

@@ -226,11 +226,7 @@ fn too_wide(model: &Model, found: f64, largest: f64) -> Diagnostic {
         &model.spans,
         &["control.frames"],
         codes::FRAMES_TOO_WIDE,
-        format!(
-            "the rotations of the workspace add up to {:.1} mrad, but user frames allow at most {:.1} mrad",
-            found * 1e3,
-            largest * 1e3
-        ),
+        format!("the workspace turns by up to {:.1} mrad; user frames allow {:.1} mrad", found * 1e3, largest * 1e3),
         "reduce workspace.rotation, or leave control.frames out".to_owned(),
     )
 }

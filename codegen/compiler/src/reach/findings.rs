@@ -215,9 +215,7 @@ fn advice(path: &PathReach, what: &str) -> String {
             libm::ceil(low * 1e8) / 100.0,
             libm::floor(high * 1e8) / 100.0
         ),
-        None => format!(
-            "no z of {what} brings it within reach: the motion is too large for this stroke; check its units, or reduce it"
-        ),
+        None => format!("no z of {what} brings it within reach of this stroke; check its units, or reduce it"),
     }
 }
 

@@ -243,8 +243,7 @@ pub(super) fn thin(
                 or(one.gain_margin, "enough"),
                 or(one.delay_margin_ticks, "enough")
             );
-            let help =
-                "reduce these values, or leave them out: the compiler's own are stable at twice the gain".to_owned();
+            let help = "reduce or omit these values: the compiler's own are stable at twice the gain".to_owned();
             findings.push(Diagnostic::at(&model.spans, keys, codes::THIN_MARGIN, message, help));
         }
     }
