@@ -103,7 +103,7 @@ pub fn of_platform(
     let mut section = empty();
     for (k, speed) in speeds.iter().enumerate() {
         let sources = added.iter().map(|(name, runs)| (*name, runs[k].clone())).collect();
-        let found = each(&quiet[k], sources, silent[k].clone());
+        let found = contributions(&quiet[k], sources, silent[k].clone());
         let together = speed.run.as_ref().map(&errors).unwrap_or_default();
         let what = format!("{} at {}", speed.name, speed.speed());
         let coverage = speed.coverage().unwrap_or_default();
@@ -138,7 +138,7 @@ pub fn of_legs(leg: &LegParameters, mode: usize, controllers: Pair, seed: u64) -
     for (source, noise) in sources(&leg.noise) {
         added.push((source, run(fine, &noise)?));
     }
-    let found = each(&quiet, added, silent);
+    let found = contributions(&quiet, added, silent);
     let together = run(own, &leg.noise)?;
     let what = format!("the leg trajectory at 1 Hz with {}", adapting_name(name));
     let mut section = empty();
@@ -148,7 +148,7 @@ pub fn of_legs(leg: &LegParameters, mode: usize, controllers: Pair, seed: u64) -
 
 /// The residual without noise and the contribution of each source. The last is the drive converter, from the run `silent`
 /// without noise and with the spec's converter.
-fn each(quiet: &Errors, sources: Vec<(&'static str, Errors)>, silent: Errors) -> Vec<ErrorSource> {
+fn contributions(quiet: &Errors, sources: Vec<(&'static str, Errors)>, silent: Errors) -> Vec<ErrorSource> {
     let less = |(name, mut errors): (&'static str, Errors)| {
         for (one, quiet) in errors.iter_mut().flatten().zip(quiet.iter().flatten()) {
             *one -= quiet;
@@ -311,7 +311,7 @@ mod tests {
     fn a_source_is_its_contribution_to_the_run_without_noise() {
         let quiet = 3.0;
         let of = |value: f64| vec![vec![value; 4]; 6];
-        let found = each(&of(quiet), vec![("gauge noise", of(quiet + 2.0))], of(3.5));
+        let found = contributions(&of(quiet), vec![("gauge noise", of(quiet + 2.0))], of(3.5));
         assert_eq!((found[0].name, found[0].errors[0][0]), ("hysteresis residual", 3.0));
         assert_eq!((found[1].name, found[1].errors[5][3]), ("gauge noise", 2.0));
         assert_eq!((found[2].name, found[2].errors[0][1]), ("DAC steps", 0.5));

@@ -58,7 +58,7 @@ pub fn of(
     parts.extend(error_card(verdict, errors));
     parts.extend(platform_card(
         &compiled.model,
-        platform::standing(&compiled.model, &compiled.findings),
+        platform::at_rest(&compiled.model, &compiled.findings),
         "drag to rotate · to scale",
     ));
     let is_error = |finding: &Diagnostic| finding.severity == Severity::Error;
@@ -292,7 +292,7 @@ pub fn refused(text: &SpecSource, all: &[Diagnostic], model: Option<&Model>, acc
     html += &card("Not computed", &format!("blocked by {}", first.code), "", &later);
     parts.push(Part::Html(html));
     if let Some(model) = model {
-        let mut view = platform::standing(model, all);
+        let mut view = platform::at_rest(model, all);
         let mut note = "drag to rotate · to scale".to_owned();
         if let (Part::View(_, data), Some((axis, figure))) = (&mut view, &beyond) {
             let asked = figure.limit.as_ref().map_or(0.0, |limit| limit.value) * 1e-6;

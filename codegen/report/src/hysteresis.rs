@@ -53,7 +53,7 @@ pub fn of_platform(
 ) -> Result<Section, RunError> {
     let own = all.iter().find(|one| one.own && one.run.is_some());
     let behind = match own {
-        Some(own) => behind(machine, controller, platform, actuator, own)?,
+        Some(own) => inverse_residuals(machine, controller, platform, actuator, own)?,
         None => Vec::new(),
     };
     let mut section = Section::new("hysteresis", "Hysteresis", "");
@@ -135,7 +135,7 @@ fn loops(leg: &LegParameters, lowest: f64, frequencies: &[f64], id: &str, title:
     (chart, widest)
 }
 
-fn behind(
+fn inverse_residuals(
     machine: &PlatformScenario,
     controller: &mut Controller,
     platform: &Platform<f64>,

@@ -100,14 +100,14 @@ pub fn run(options: &Options, ui: &mut Ui) -> Result<(), Failure> {
     ui.findings(Some(&compiled.source), &compiled.findings);
     let output = place(options, &compiled.ir.name);
     check_place(&output)?;
-    let paper = options.paper.then(|| beside(&output));
+    let paper = options.paper.then(|| paper_path(&output));
     paper.as_deref().map_or(Ok(()), check_place)?;
     if let Some(record) = &options.record {
         return of_record(options, record, &output, &compiled, ui);
     }
     let mut built = build(&compiled, options.no_target, ui)?;
     let name = file_name(&options.spec);
-    let command = again(options, &name).to_string();
+    let command = command_line(options, &name).to_string();
     let mut fine = fine(&compiled)?;
     let simulated = simulated::of(&compiled, [&mut built.controller, &mut fine], &name, ui)?;
 
@@ -154,7 +154,8 @@ fn of_record(
 ) -> Result<(), Failure> {
     let run = recorded::read(record, compiled, ui)?;
     let (first, mut sections) = crate::record::page(compiled, &run);
-    let command = again(options, &file_name(&options.spec)).words("--record").path(file_name(record)).to_string();
+    let command =
+        command_line(options, &file_name(&options.spec)).words("--record").path(file_name(record)).to_string();
     for section in &mut sections {
         section.command.clone_from(&command);
     }
@@ -174,7 +175,8 @@ fn refused(options: &Options, refused: Refusal, ui: &mut Ui) -> Result<(), Failu
     check_place(&output)?;
     let first = first::refused(source, &refused.findings, model.as_ref(), accepted(source, &refused.findings));
     let digest = target::sha256(source.text.as_bytes());
-    let mut head = head(&source.display_name, &digest, "refused", again(options, &file_name(&options.spec)).into());
+    let mut head =
+        head(&source.display_name, &digest, "refused", command_line(options, &file_name(&options.spec)).into());
     head.versions = format!("specgen {}", env!("CARGO_PKG_VERSION"));
     head.refused = true;
     let lines = specgen_language::diagnostic::render(&refused.findings, source, false);
@@ -283,13 +285,13 @@ fn place(options: &Options, name: &str) -> PathBuf {
 }
 
 /// File of the page with the paper's figures.
-fn beside(output: &Path) -> PathBuf {
+fn paper_path(output: &Path) -> PathBuf {
     let stem = output.file_stem().map_or_else(|| "report".to_owned(), |stem| stem.to_string_lossy().into_owned());
     output.with_file_name(format!("{stem}-paper.html"))
 }
 
 /// The command line with only the spec's file name: its folder is private to the user.
-fn again(options: &Options, name: &str) -> shell::Line {
+fn command_line(options: &Options, name: &str) -> shell::Line {
     let mut given = Vec::new();
     if options.paper {
         given.push("--paper".to_owned());

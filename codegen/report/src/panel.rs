@@ -26,7 +26,7 @@ const SCRIPT: &str = concat!(
 /// Static data of a platform for the page: its geometry, limits of the legs (V), its modes (Hz).
 #[must_use]
 pub fn facts(model: &Model, design: Option<&Design>) -> Value {
-    let view = match platform::standing(model, &[]) {
+    let view = match platform::at_rest(model, &[]) {
         Part::View(_, view) => view,
         _ => Value::Null,
     };

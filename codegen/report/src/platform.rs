@@ -52,7 +52,7 @@ fn product(rows: &[[f64; 6]; 6], vector: &[f64; 6]) -> [f64; 6] {
 
 /// Joints, legs, gauges, work part and dimensions of the platform at rest, with the subjects of `findings` marked.
 #[must_use]
-pub fn standing(model: &Model, findings: &[Diagnostic]) -> Part {
+pub fn at_rest(model: &Model, findings: &[Diagnostic]) -> Part {
     let mut data = geometry(model);
     data["label"] = json!(format!(
         "The platform of {}: base, six legs, {}, dimensions.",
@@ -86,7 +86,7 @@ pub fn standing(model: &Model, findings: &[Diagnostic]) -> Part {
 
 /// The platform along a motion; bars show each leg within its `travel`, m.
 #[must_use]
-pub fn moving(model: &Model, motion: &Motion, travel: f64) -> Part {
+pub fn in_motion(model: &Model, motion: &Motion, travel: f64) -> Part {
     let mut data = geometry(model);
     // Integer nanometres and nanoradians.
     let whole = |values: &[f64; 6]| values.map(|v| libm::round(v * 1e9) as i64);

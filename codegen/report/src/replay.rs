@@ -50,7 +50,7 @@ pub fn run(
         return Err(Failure::Usage("--plot needs a replay: give the --spec of the recording".to_owned()));
     }
     match spec {
-        Some(spec) => again(recording, spec, (reader, exports), plot, ui),
+        Some(spec) => run_again(recording, spec, (reader, exports), plot, ui),
         None => {
             let shown = recording.display().to_string();
             let found = export(&mut reader, &mut exports, &shown)?;
@@ -63,7 +63,7 @@ pub fn run(
     }
 }
 
-fn again(
+fn run_again(
     recording: &Path,
     (spec, emitted): (&Path, bool),
     (mut reader, mut exports): (Reader<BufReader<File>>, Exports),

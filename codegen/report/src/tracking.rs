@@ -175,7 +175,7 @@ pub fn follow(
 
 /// Figures of the runs with limits in the spec, nm and nrad rms.
 #[must_use]
-pub fn judged(model: &Model, all: &[TrackedPath]) -> Vec<Figure> {
+pub fn figures(model: &Model, all: &[TrackedPath]) -> Vec<Figure> {
     let mut figures = Vec::new();
     for one in all {
         let Some((rms, coverage)) = one.rms().zip(one.coverage()) else { continue };
@@ -226,7 +226,7 @@ pub fn lines(model: &Model, noise: Option<&[f64; 6]>, all: &[TrackedPath], turni
     if let Some(noise) = noise {
         let nano = noise.map(|v| v * 1e9);
         let axes = if turning { 3..6 } else { 0..3 };
-        let each: Vec<String> = axes.map(|axis| format!("{} {}", AXES[axis], few(nano[axis]))).collect();
+        let each: Vec<String> = axes.map(|axis| format!("{} {}", AXES[axis], two_digits(nano[axis]))).collect();
         let values = vec![(true, norm(&nano, turning), None)];
         let unit = if turning { "nrad" } else { "nm" };
         let note = format!("{} {unit}", each.join(", "));
@@ -252,7 +252,7 @@ pub fn lines(model: &Model, noise: Option<&[f64; 6]>, all: &[TrackedPath], turni
     lines
 }
 
-fn few(value: f64) -> String {
+fn two_digits(value: f64) -> String {
     if value < 9.95 { format!("{value:.1}") } else { format!("{value:.0}") }
 }
 
@@ -286,7 +286,7 @@ pub fn dumbbell(lines: &[Line], speeds: [Option<String>; 2], unit: &str) -> Rows
             .map(|(k, (own, value, _))| {
                 let before = several && k == 0 || !several && !line.note.is_empty();
                 let outer = k == 0 || k + 1 == line.values.len();
-                json!({ "m": if *own { "hollow" } else { "dot" }, "x": value, "text": if outer { few(*value) } else { String::new() }, "before": before })
+                json!({ "m": if *own { "hollow" } else { "dot" }, "x": value, "text": if outer { two_digits(*value) } else { String::new() }, "before": before })
             })
             .collect();
         let noted = if several || line.values.is_empty() { None } else { line.values.first().map(|one| one.1) };

@@ -108,14 +108,14 @@ fn source(draft: &Draft, name: &str, place: &Path) -> SpecSource {
 }
 
 /// The finding about the value at `key`, if any.
-fn wrong(draft: &Draft, name: &str, place: &Path, key: &str) -> Option<Diagnostic> {
+fn finding_at(draft: &Draft, name: &str, place: &Path, key: &str) -> Option<Diagnostic> {
     let (_, findings) = spec::load_as_far(&source(draft, name, place));
     let blamed = |found: &Diagnostic| found.severity == Severity::Error && found.key.starts_with(key);
     findings.into_iter().find(blamed)
 }
 
 fn take_options(draft: &mut Draft, answers: &Answers, name: &str, place: &Path) -> Result<(), Failure> {
-    if let Some(found) = wrong(draft, name, place, "name") {
+    if let Some(found) = finding_at(draft, name, place, "name") {
         return Err(Failure::Usage(format!("{}; {}", found.message, found.help)));
     }
     let mut refused = Vec::new();
@@ -123,7 +123,7 @@ fn take_options(draft: &mut Draft, answers: &Answers, name: &str, place: &Path) 
         let Some(answer) = answers.get(question.option) else { continue };
         draft.set(question.key, questions::literal(question, answer), Origin::Given);
         compute(draft);
-        if let Some(found) = wrong(draft, name, place, question.key) {
+        if let Some(found) = finding_at(draft, name, place, question.key) {
             refused.push(format!("--{} \"{answer}\": {}; {}", question.option, found.message, found.help));
         }
     }
@@ -159,7 +159,7 @@ fn ask_the_rest(draft: &mut Draft, name: &str, place: &Path) -> Result<(), Failu
             let mut tried = draft.clone();
             tried.set(question.key, questions::literal(question, &answer), Origin::Given);
             compute(&mut tried);
-            let Some(found) = wrong(&tried, name, place, question.key) else {
+            let Some(found) = finding_at(&tried, name, place, question.key) else {
                 *draft = tried;
                 break;
             };

@@ -7,7 +7,7 @@ use host_sim::controller::TickController;
 use serde::Serialize;
 
 use crate::details;
-use crate::firmware::{self, late};
+use crate::firmware::{self, check_tick_time};
 use crate::verdict::{Answer, Verdict};
 use crate::verify::{self, Inspection, Measurement};
 use specgen_compiler::compile::Compilation;
@@ -125,7 +125,7 @@ pub fn run(options: &Options, ui: &mut Ui) -> Result<(), Failure> {
         Err(failure) => return Err(failure),
     };
     summary.over_budget = over_budget(&compiled, &summary);
-    summary.over_budget.extend(late(&compiled, summary.measurement.as_ref(), ui));
+    summary.over_budget.extend(check_tick_time(&compiled, summary.measurement.as_ref(), ui));
     match (&summary.measurement, &summary.image) {
         (Some(measurement), _) => summary.verdict.measured(&compiled, measurement),
         (None, Some(image)) => summary.verdict.inspected(&compiled, image),

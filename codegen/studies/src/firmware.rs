@@ -279,7 +279,7 @@ fn build(
                 let why = if measure { "see the note above" } else { "--no-measure" };
                 made.notes.push(format!("the time of a tick was not estimated: {why}"));
             }
-            made.failures.extend(late(compiled, made.measurement.as_ref(), ui));
+            made.failures.extend(check_tick_time(compiled, made.measurement.as_ref(), ui));
             let missed = compiled.missed();
             made.failures.extend(missed.iter().map(|one| format!("{}: {}; {}", one.code, one.message, one.help)));
             ui.findings(Some(&compiled.source), &missed);
@@ -288,12 +288,16 @@ fn build(
             }
         }
     }
-    hold_against_budget(&mut made, compiled, target);
+    check_budget(&mut made, compiled, target);
     Ok(made)
 }
 
 /// Reports findings about the time of a tick. Returns why the controller must not be used, if it is too long.
-pub(crate) fn late(compiled: &Compilation, measurement: Option<&Measurement>, ui: &mut Ui) -> Option<String> {
+pub(crate) fn check_tick_time(
+    compiled: &Compilation,
+    measurement: Option<&Measurement>,
+    ui: &mut Ui,
+) -> Option<String> {
     let finding = time::finding(compiled, measurement?.time.as_ref()?)?;
     let failure = format!("{}: {}; {}", finding.code, finding.message, finding.help);
     let fails = finding.severity == Severity::Error;
@@ -363,7 +367,7 @@ fn emulate(
 }
 
 /// Adds failures of budget, checks and bits.
-fn hold_against_budget(made: &mut BuildResult, compiled: &Compilation, target: Target) {
+fn check_budget(made: &mut BuildResult, compiled: &Compilation, target: Target) {
     let measured = made.measurement.as_ref();
     let used = match (target.kind, &made.size, &made.checks) {
         // Use the figures of the measured image.

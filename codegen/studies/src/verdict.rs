@@ -111,7 +111,7 @@ impl Verdict {
     }
 
     fn image<'a>(&mut self, compiled: &Compilation, used: &ImageUsage, faults: impl Iterator<Item = &'a String>) {
-        for held in budget::held(&compiled.model.target, used) {
+        for held in budget::usage_lines(&compiled.model.target, used) {
             let (subject, unit) =
                 if held.what == "instructions" { (Subject::Time, "instructions") } else { (Subject::Memory, "bytes") };
             let figure = Figure::new(subject, held.what, held.used as f64, unit);
@@ -168,8 +168,8 @@ impl Verdict {
             Answer::NotMeasured => format!("{name} is good so far{on}: {kept}{warnings}"),
             Answer::NotReady => {
                 let beyond: Vec<&Figure> = self.beyond().collect();
-                let why: Vec<String> = beyond.chunk_by(together).map(why).collect();
-                format!("{name} is NOT ready: {}{warnings}", why.join(", "))
+                let reasons: Vec<String> = beyond.chunk_by(share_a_group).map(reason).collect();
+                format!("{name} is NOT ready: {}{warnings}", reasons.join(", "))
             }
         }
     }
@@ -178,7 +178,7 @@ impl Verdict {
     #[must_use]
     pub fn line(&self, subject: Subject) -> Option<String> {
         let figures: Vec<&Figure> = self.figures.iter().filter(|figure| figure.subject == subject).collect();
-        let groups: Vec<&[&Figure]> = figures.chunk_by(together).collect();
+        let groups: Vec<&[&Figure]> = figures.chunk_by(share_a_group).collect();
         // Neighbours with the same unit and measured part show these once.
         let alike = |a: &Figure, b: &Figure| a.unit == b.unit && a.coverage == b.coverage;
         let runs = groups.chunk_by(|a, b| alike(a[0], b[0]) && a[0].words.is_none() && b[0].words.is_none());
@@ -216,7 +216,7 @@ impl Verdict {
         if !next.is_empty() {
             lines.push(format!("  {:<9}{next}", "next"));
         }
-        lines.iter().map(|line| format!("{}\n", cut(line))).collect()
+        lines.iter().map(|line| format!("{}\n", shorten(line))).collect()
     }
 }
 
@@ -225,13 +225,13 @@ fn is_axis(figure: &Figure) -> bool {
 }
 
 /// Whether neighbours are coordinates to be written as one group.
-fn together(a: &&Figure, b: &&Figure) -> bool {
+fn share_a_group(a: &&Figure, b: &&Figure) -> bool {
     let both = is_axis(a) && is_axis(b) && a.subject == b.subject;
     both && a.unit == b.unit && a.relation() == b.relation() && a.words == b.words
 }
 
 /// Exceeded limits as a reason: `flash 68.4 > 64`, `noise x/y 6.1/5.4 > 5/5 nm`.
-fn why(group: &[&Figure]) -> String {
+fn reason(group: &[&Figure]) -> String {
     let first = group[0];
     if first.words.is_some() {
         return first.subject.name().to_owned();
@@ -244,7 +244,7 @@ fn why(group: &[&Figure]) -> String {
 }
 
 /// Shortens a line that is too long, between two figures; the details contain all of it.
-fn cut(line: &str) -> String {
+fn shorten(line: &str) -> String {
     const MORE: &str = ", …";
     if line.chars().count() <= WIDTH {
         return line.to_owned();

@@ -174,7 +174,7 @@ pub fn measure(image: &Image, config: &[u64], host: &Trace) -> Result<Measuremen
     let seen = inspect(image)?;
     let mut checks = seen.checks;
     let (replayed, stats) = replay(image, config, host)?;
-    checks.hold_against_painted(stats.painted_stack);
+    checks.check_painted_stack(stats.painted_stack);
     let used = used(image, Some(&stats), &checks)?;
     let stages = stats.stages.iter().filter(|stage| stage.calls > 0).map(|stage| Stage {
         name: stage.name.clone(),

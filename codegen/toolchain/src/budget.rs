@@ -43,37 +43,37 @@ pub struct BudgetLine {
 
 /// All known figures with their limits. Omits RAM if a part of it is unknown, an unbounded stack, and instructions that were not counted.
 #[must_use]
-pub fn held(target: &Target, used: &ImageUsage) -> Vec<BudgetLine> {
+pub fn usage_lines(target: &Target, used: &ImageUsage) -> Vec<BudgetLine> {
     let (part, budget) = (target.mcu.part(), &target.budget);
     let limit = |declared: Option<u64>, key: &str, has: u64| match declared {
         Some(bytes) => (bytes, format!("target.budget.{key}")),
         None => (has, part.name.to_owned()),
     };
-    let mut held =
+    let mut lines =
         vec![BudgetLine { what: "flash", used: used.flash, most: Some(limit(budget.flash, "flash", part.flash)) }];
     let ram = || Some(limit(budget.ram, "ram", part.ram));
-    held.extend(used.ram.map(|ram_used| BudgetLine { what: "RAM", used: ram_used, most: ram() }));
+    lines.extend(used.ram.map(|ram_used| BudgetLine { what: "RAM", used: ram_used, most: ram() }));
     if let Some(stack) = used.stack {
-        held.push(BudgetLine { what: "stack", used: stack, most: Some(limit(budget.stack, "stack", part.ram)) });
+        lines.push(BudgetLine { what: "stack", used: stack, most: Some(limit(budget.stack, "stack", part.ram)) });
     }
     if let Some(instructions) = used.instructions {
         let most = budget.instructions.map(|most| (most, "target.budget.instructions".to_owned()));
-        held.push(BudgetLine { what: "instructions", used: instructions, most });
+        lines.push(BudgetLine { what: "instructions", used: instructions, most });
     }
-    held
+    lines
 }
 
 /// One message per exceeded limit.
 #[must_use]
 pub fn over(target: &Target, used: &ImageUsage) -> Vec<String> {
     let mut over = Vec::new();
-    let mut held = held(target, used);
+    let mut lines = usage_lines(target, used);
     if used.ram.is_none() {
         // The known parts alone may exceed the limit.
         let part = ImageUsage { ram: Some(used.ram_least), ..ImageUsage::default() };
-        held.extend(self::held(target, &part).into_iter().filter(|one| one.what == "RAM"));
+        lines.extend(usage_lines(target, &part).into_iter().filter(|one| one.what == "RAM"));
     }
-    for BudgetLine { what, used: amount, most } in held {
+    for BudgetLine { what, used: amount, most } in lines {
         let Some((most, from)) = most.filter(|(most, _)| amount > *most) else { continue };
         let (unit, by) = match what {
             "flash" => ("bytes", &used.flash_by),
@@ -173,7 +173,7 @@ mod tests {
     fn ram_of_which_a_part_is_missing_is_no_figure_and_may_be_too_much_all_the_same() {
         let mut target = Target { mcu: Mcu::Mps2An500, budget: Budget { ram: Some(2000), ..Budget::NONE } };
         let part = ImageUsage { ram: None, ram_least: 1440, ..used() };
-        assert!(held(&target, &part).iter().all(|one| one.what != "RAM"));
+        assert!(usage_lines(&target, &part).iter().all(|one| one.what != "RAM"));
         assert_eq!(over(&target, &part), Vec::<String>::new());
         target.budget.ram = Some(1439);
         let words = over(&target, &part).join("\n");

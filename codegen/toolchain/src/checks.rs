@@ -134,7 +134,7 @@ pub fn check(elf: &[u8], tick: Option<&str>, rules: Rules) -> Result<TickChecks,
 
 impl TickChecks {
     /// Adds a violation if a tick was measured to use more stack than the bound.
-    pub fn hold_against_painted(&mut self, painted: u64) {
+    pub fn check_painted_stack(&mut self, painted: u64) {
         if let Some(bound) = self.stack
             && painted > bound
         {
@@ -278,9 +278,9 @@ mod tests {
             path: Vec::new(),
             faults: Vec::new(),
         };
-        checked.hold_against_painted(100);
+        checked.check_painted_stack(100);
         assert!(checked.faults.is_empty());
-        checked.hold_against_painted(104);
+        checked.check_painted_stack(104);
         assert_eq!(checked.faults.first().map(|fault| fault.rule), Some(Rule::StackBound));
     }
 }

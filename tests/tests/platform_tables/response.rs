@@ -82,17 +82,17 @@ fn a_machine_that_is_not_its_spec_learns_with_its_own_response() {
         let declared = [UserRange { factor: *factor, range: [1.0 - part, 1.0 + part] }];
         let limited = model.convergence(&Factors::of(&compiled.model, &declared), WISH).map(|found| found.band[1]);
         let blind = on(bench, leg, off, |machine| learned(machine, &model, &usual, 6));
-        let (heard, convergence, own) = on(bench, leg, off, |machine| {
+        let (modes, convergence, own) = on(bench, leg, off, |machine| {
             let response = measured(machine, &model);
-            let heard = model.mode_measurements(&response);
+            let modes = model.mode_measurements(&response);
             let with = Learnable::of(compiled).unwrap().with(Response::read(&response.to_json()).unwrap());
             let convergence = with.convergence(&Factors::of(&compiled.model, &[]), WISH).unwrap();
             let own = learned(machine, &with, &convergence, 6);
-            (heard, convergence, own)
+            (modes, convergence, own)
         });
-        (limited, blind, heard, convergence, own)
+        (limited, blind, modes, convergence, own)
     });
-    for (((legs, ..), (what, ..)), (limited, blind, heard, convergence, own)) in cases.iter().zip(&found) {
+    for (((legs, ..), (what, ..)), (limited, blind, modes, convergence, own)) in cases.iter().zip(&found) {
         let errors =
             |learned: &LearningResult| -> Vec<f64> { learned.passes.iter().map(|pass| pass.translation_nm).collect() };
         let [low, high] = convergence.band;
@@ -106,7 +106,7 @@ fn a_machine_that_is_not_its_spec_learns_with_its_own_response() {
             errors(own),
             own.passes[own.best].orientation_nrad,
         );
-        for one in heard {
+        for one in modes {
             println!("    {one:?}");
         }
         assert!(limited.is_none_or(|hertz| hertz < 600.0), "{limited:?}");

@@ -41,7 +41,7 @@ fn prepared(model: &Model) -> Machine {
 
 /// A machine at rest, led to the voltages of a tick, where the gauges read `reading`. A leg goes there through a peak that
 /// makes its gauge read so; which one it was, nobody knows. Each gauge of a platform sees all legs, which go there straight.
-fn led(machine: &Machine, model: &Model, voltages: &[f64; 6], reading: &[f64; 6]) -> Machine {
+fn moved_to(machine: &Machine, model: &Model, voltages: &[f64; 6], reading: &[f64; 6]) -> Machine {
     let rest = [model.rest_voltage(); 6];
     let through = |peaks: &[f64; 6]| {
         let mut machine = machine.clone();
@@ -108,7 +108,7 @@ pub(super) fn simulate(
                 (block.state != power_up, recorded.get(samples.len()), block.rows.first())
             {
                 let reading = words.gauge.map(|place| words.scalar.decode(row.input[place]));
-                machine = led(&prepared, &compiled.model, &first.voltage, &reading);
+                machine = moved_to(&prepared, &compiled.model, &first.voltage, &reading);
                 let found = machine.read_gauges();
                 offset = std::array::from_fn(|k| reading[k] - found[k]);
                 settled = block.first + settle;

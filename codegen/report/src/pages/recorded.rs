@@ -57,14 +57,14 @@ pub fn read(path: &Path, compiled: &Compilation, ui: &Ui) -> Result<Run, Failure
         run.faults += usize::from(word.phase == FAULTED);
         run.phases.push((change.tick, format!("{word}, amplifiers {}", if word.amplifier_on { "on" } else { "off" })));
     }
-    run.recorded = again(&mut machine, &blocks, &words)?;
+    run.recorded = replay_outputs(&mut machine, &blocks, &words)?;
     ui.progress("running the same commands with a simulated machine");
     run.simulated = beside::simulate(&mut machine, &blocks, &words, compiled, &mut run.recorded);
     Ok(run)
 }
 
 /// Replays the record for outputs that it does not contain.
-fn again(machine: &mut Supervised, blocks: &[Block], words: &Words) -> Result<Vec<Sample>, Failure> {
+fn replay_outputs(machine: &mut Supervised, blocks: &[Block], words: &Words) -> Result<Vec<Sample>, Failure> {
     let mut output = vec![0; machine.output_names().len()];
     let mut samples = Vec::new();
     let mut next = None;

@@ -80,7 +80,7 @@ fn of_platform(
                     one.name,
                     one.speed()
                 ))
-                .part(platform::moving(model, &motion, travel)),
+                .part(platform::in_motion(model, &motion, travel)),
         );
     }
     ui.progress("error budget");
@@ -117,7 +117,7 @@ fn of_platform(
         text: text.unwrap_or_else(|| "no trajectory in the spec".to_owned()),
         note: format!("{law}, rms norm of three axes, simulated."),
     };
-    Ok(SimulatedRuns { sections, errors, judged: tracking::judged(model, &all) })
+    Ok(SimulatedRuns { sections, errors, judged: tracking::figures(model, &all) })
 }
 
 fn of_legs(
@@ -164,7 +164,7 @@ fn of_legs(
         sections.push(
             Section::new("motion", "Motion", "")
                 .lead("Gauge readings of the legs, and the resulting pose of the platform, which no gauge of this spec measures.")
-                .part(platform::moving(model, &motion, model.actuator.stroke)),
+                .part(platform::in_motion(model, &motion, model.actuator.stroke)),
         );
     }
     ui.progress("error budget");

@@ -4,7 +4,7 @@ use crate::chart::{Axis, Chart, DASHED, LINE, pairs};
 use crate::section::{Grid, Section};
 use specgen_studies::paper::convergence::Convergence;
 use specgen_studies::paper::printed::TABLE_3;
-use specgen_studies::reproduce::write::fell;
+use specgen_studies::reproduce::write::convergence_text;
 
 /// The section of a search; `command` reproduces it.
 #[must_use]
@@ -16,7 +16,7 @@ pub fn section(found: &Convergence, command: &str) -> Section {
         table.push(row.map(str::to_owned).to_vec());
     }
     Section::new("convergence", "Genetic algorithm", command)
-        .text(&fell(found))
+        .text(&convergence_text(found))
         .text("The spec is not changed; specgen tune writes better parameters into it, using this algorithm or CMA-ES.")
         .charts(charts)
         .table(table)

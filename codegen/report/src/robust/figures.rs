@@ -258,7 +258,7 @@ impl<'a> StudyResult<'a> {
     }
 
     /// Conditions of the gate.
-    fn asked(&self) -> String {
+    fn gate_conditions(&self) -> String {
         let mut parts = vec!["none diverged".to_owned()];
         let which = self.gate.quantile.map_or("largest".to_owned(), |percent| format!("{percent} % quantile of the"));
         if let Some(limit) = self.gate.error_nm {
@@ -304,7 +304,7 @@ impl<'a> StudyResult<'a> {
             }
             let d = &member.deviation;
             let _ = write!(out, ",{},{},{},{}", d.mass, d.damping, d.noise, d.delay_ticks);
-            for value in EACH.into_iter().flat_map(|factor| each(d, factor)) {
+            for value in EACH.into_iter().flat_map(|factor| by_leg(d, factor)) {
                 let _ = write!(out, ",{value}");
             }
             let figures = outcome.figures();
@@ -368,7 +368,7 @@ impl CommandOutcome for Report<'_> {
         let _ = writeln!(out, "diverged (error above {bound:.0} nm): {} of {}", self.diverged, self.runs.len());
         if self.gate.complete {
             if self.gate.reasons.is_empty() {
-                let _ = writeln!(out, "gate: passed ({})", found.asked());
+                let _ = writeln!(out, "gate: passed ({})", found.gate_conditions());
             }
             for reason in self.gate.reasons {
                 let _ = writeln!(out, "gate: {reason}");
@@ -411,7 +411,7 @@ impl Report<'_> {
 const EACH: [Factor; 6] =
     [Factor::Stiffness, Factor::Gain, Factor::Hysteresis, Factor::Creep, Factor::Lag, Factor::GaugeLag];
 
-fn each(deviation: &Deviation, factor: Factor) -> [f64; 6] {
+fn by_leg(deviation: &Deviation, factor: Factor) -> [f64; 6] {
     deviation.legs.map(|leg| match factor {
         Factor::Stiffness => leg.stiffness,
         Factor::Gain => leg.gain,
@@ -427,7 +427,7 @@ fn described(d: &Deviation) -> String {
     let mut out =
         format!("  mass {:.3}, damping {:.3}, noise {:.3}, delay {} ticks", d.mass, d.damping, d.noise, d.delay_ticks);
     for factor in EACH {
-        let values = each(d, factor);
+        let values = by_leg(d, factor);
         if values.iter().all(|value| value.to_bits() == values[0].to_bits()) {
             let _ = write!(out, ", {factor} {:.3}", values[0]);
         } else {

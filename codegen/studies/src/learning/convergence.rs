@@ -123,7 +123,7 @@ impl Convergence {
     pub fn passed(&self, hertz: f64) -> f64 {
         let [low, high] = self.band;
         let below = if low > 0.0 { 1.0 / (1.0 + libm::pow(low / hertz, ORDERS[1])) } else { 1.0 };
-        below * cut(hertz, high)
+        below * low_pass(hertz, high)
     }
 
     /// The share of T⁻¹ used at a frequency, Hz.
@@ -351,6 +351,6 @@ pub(super) fn highest(bandwidth: f64, period: f64) -> f64 {
 }
 
 /// |Q| at its upper end.
-pub(super) fn cut(hertz: f64, bandwidth: f64) -> f64 {
+pub(super) fn low_pass(hertz: f64, bandwidth: f64) -> f64 {
     1.0 / (1.0 + libm::pow(hertz / bandwidth, ORDERS[0]))
 }

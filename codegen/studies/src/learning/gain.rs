@@ -69,7 +69,7 @@ impl Judge {
 
     /// Decides on the next pass.
     pub(super) fn judge(&mut self, pass: Score) -> Verdict {
-        match pass.beside([&self.first, &self.best], &self.noise) {
+        match pass.compare([&self.first, &self.best], &self.noise) {
             Some(Ordering::Less) => {
                 (self.best, self.idle) = (pass, false);
                 Verdict::Keep
@@ -116,7 +116,7 @@ impl Score {
 
     /// Compares this pass with the best one. `Less`: better by more than the noise, with neither translation nor angles worse than in the
     /// first pass by more than the noise. `Greater`: worse in one of them by more than the noise. `Equal`: in between. `None`: not a number.
-    pub(super) fn beside(&self, [first, best]: [&Self; 2], noise: &Noise) -> Option<Ordering> {
+    pub(super) fn compare(&self, [first, best]: [&Self; 2], noise: &Noise) -> Option<Ordering> {
         let ([.., both], [.., least]) = (self.squares, best.squares);
         let [.., apart] = noise.between(self, best);
         let allowed = noise.between(self, first);
@@ -190,7 +190,7 @@ mod tests {
             assert!((found - expected).abs() < 1e-12, "{found} {expected}");
         }
         assert!((noise.nm(&first) * 1e-9 - 0.3 / libm::sqrt(10.01)).abs() < 1e-12);
-        let beside = |x: f64, rx: f64| score(|_| x, rx).beside([&first, &first], &noise);
+        let compare = |x: f64, rx: f64| score(|_| x, rx).compare([&first, &first], &noise);
         for (x, rx, expected) in [
             (2.8, 1.0, Some(Ordering::Less)),
             (2.95, 1.0, Some(Ordering::Equal)),
@@ -202,13 +202,13 @@ mod tests {
             (3.05, 0.0, Some(Ordering::Less)),
             (f64::NAN, 1.0, None),
         ] {
-            assert_eq!(beside(x, rx), expected, "{x} {rx}");
+            assert_eq!(compare(x, rx), expected, "{x} {rx}");
         }
         // Better than the first but not than the best. A smaller error has a smaller noise.
         let best = score(|_| 0.5, 0.0);
-        assert_eq!(score(|_| 0.65, 0.0).beside([&first, &best], &noise), Some(Ordering::Greater));
-        assert_eq!(score(|_| 0.45, 0.0).beside([&first, &best], &noise), Some(Ordering::Equal));
-        assert_eq!(score(|_| 0.3, 0.0).beside([&first, &best], &noise), Some(Ordering::Less));
+        assert_eq!(score(|_| 0.65, 0.0).compare([&first, &best], &noise), Some(Ordering::Greater));
+        assert_eq!(score(|_| 0.45, 0.0).compare([&first, &best], &noise), Some(Ordering::Equal));
+        assert_eq!(score(|_| 0.3, 0.0).compare([&first, &best], &noise), Some(Ordering::Less));
     }
 
     #[test]

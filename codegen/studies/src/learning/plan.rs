@@ -135,7 +135,7 @@ impl Grid {
 
     /// Response of the device itself at a frequency (Hz): it averages the error over the ticks around a knot, and plays a spline
     /// through knots.
-    fn shown(&self, hertz: f64) -> Complex {
+    fn device_response(&self, hertz: f64) -> Complex {
         let angle = 0.5 * TAU * hertz * self.period;
         let ticks = f64::from(self.spacing);
         let below = ticks * libm::sin(angle);
@@ -156,7 +156,7 @@ impl Grid {
                 spectra[channel][bin] = value;
                 spectra[channel][length - bin] = value.conj();
             };
-            let shown = self.shown(*hertz);
+            let shown = self.device_response(*hertz);
             for (mode, row) in response.iter().enumerate() {
                 let [re, im] = times(row[mode], shown);
                 put(mode, passed * wish.share(*hertz) / Complex64::new(re, im));
@@ -199,7 +199,7 @@ impl Grid {
             kept[0][0] += 2.0 * tap * libm::cos(angle * number as f64);
         }
         kept = [kept[0]; 6];
-        let shown = self.shown(hertz);
+        let shown = self.device_response(hertz);
         std::array::from_fn(|i| {
             let part = times(learned[i], shown);
             std::array::from_fn(|j| {

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use specgen_numerics::fft::{self, Complex64, Fft};
 
-use super::convergence::{Convergence, Learnable, cut, highest};
+use super::convergence::{Convergence, Learnable, highest, low_pass};
 use super::matrix::{Matrix6c, inverse};
 use super::motion::Motion;
 use specgen_numerics::Matrix6;
@@ -94,7 +94,7 @@ impl Update {
             channel
                 .iter()
                 .zip(frequencies)
-                .map(|(response, hertz)| (inverse(response), cut(*hertz, bandwidth)))
+                .map(|(response, hertz)| (inverse(response), low_pass(*hertz, bandwidth)))
                 .collect()
         });
         let start = motion.targets[0].pose;

@@ -47,7 +47,7 @@ fn frequency(row: &Row) -> String {
 }
 
 /// How the search went, in a sentence.
-pub fn fell(convergence: &Convergence) -> String {
+pub fn convergence_text(convergence: &Convergence) -> String {
     let (Some(first), Some(last)) = (convergence.history.first(), convergence.history.last()) else {
         return "No generation was run.".to_owned();
     };
@@ -125,7 +125,8 @@ impl Results {
                 let _ = writeln!(out, "- **{}**: {}", remark.id(), remark.text());
             }
             if table.id == "table-3" {
-                let _ = writeln!(out, "\n{} Costs by generation: `convergence.csv`.", fell(&self.convergence));
+                let _ =
+                    writeln!(out, "\n{} Costs by generation: `convergence.csv`.", convergence_text(&self.convergence));
             }
         }
         out

@@ -87,7 +87,7 @@ impl Outcome {
 }
 
 /// Outcome of a machine that never started.
-fn lost(why: &dyn fmt::Display) -> Outcome {
+fn diverged(why: &dyn fmt::Display) -> Outcome {
     Outcome::Diverged { time: None, reason: why.to_string(), limited_percent: 0.0 }
 }
 
@@ -116,7 +116,7 @@ impl Study<'_> {
     /// If the run cannot be set up or the controller refuses its own settings.
     pub fn run(&self, member: &Member) -> Result<Outcome, RunError> {
         match self.simulate(member) {
-            Err(error @ (RunError::NotReady { .. } | RunError::NotFinite { .. })) => Ok(lost(&error)),
+            Err(error @ (RunError::NotReady { .. } | RunError::NotFinite { .. })) => Ok(diverged(&error)),
             Ok(Outcome::Ran(figures)) => self.learned(member, figures),
             other => other,
         }
@@ -127,9 +127,11 @@ impl Study<'_> {
         let Some(learning) = &self.learning else { return Ok(Outcome::Ran(figures)) };
         match self.learn(learning, member) {
             Ok(learned) => Ok(Outcome::Ran(Figures { learned, ..figures })),
-            Err(LearnError::Run(error @ (RunError::NotReady { .. } | RunError::NotFinite { .. }))) => Ok(lost(&error)),
+            Err(LearnError::Run(error @ (RunError::NotReady { .. } | RunError::NotFinite { .. }))) => {
+                Ok(diverged(&error))
+            }
             Err(LearnError::Run(error)) => Err(error),
-            Err(error) => Ok(lost(&format_args!("learning: {error}"))),
+            Err(error) => Ok(diverged(&format_args!("learning: {error}"))),
         }
     }
 
