@@ -1,4 +1,4 @@
-//! What nobody measured: named in the spec and in records, counted by the verdict, asked about before a real machine.
+//! Values that were not measured: the spec and records name them, the verdict counts them, and a real machine needs confirmation.
 
 use std::fs;
 
@@ -20,7 +20,7 @@ fn list_of(text: &str) -> &str {
     &text[start..end]
 }
 
-/// A spec of the folder with another list; none takes the key out.
+/// A spec of the folder with another list; an empty one removes the key.
 fn with_list(folder: &Folder, spec: &str, list: &str) -> String {
     let text = folder.read(spec);
     text.replacen(list_of(&text), list, 1)
@@ -56,13 +56,13 @@ fn each_entry_is_the_path_of_a_value_that_the_spec_has_once() {
         "\"gauge.point\", \"gauge.direction\"",
         "\"workspace.translation[2]\", \"workspace.translation[1]\"",
         "\"hysteresis.records\", \"trajectory[2].frequency\"",
-        // A default is a value, too.
+        // A default is also a value.
         "\"sensor.lag\", \"platform.products\"",
     ] {
         let found = errors(good);
         assert!(found.is_empty(), "{good}: {found:#?}");
     }
-    // The entry, code, a part of message or help, and what may stand in its place.
+    // Entry, code, part of message or help, and the offered replacement.
     for (bad, code, words, replacement) in [
         ("\"sensor.nois\"", "E0345", "did you mean \"sensor.noise\"?", "\"sensor.noise\""),
         ("\"axial_stiffness\"", "E0345", "did you mean \"actuator.axial_stiffness\"?", "\"actuator.axial_stiffness\""),
@@ -92,7 +92,7 @@ fn each_entry_is_the_path_of_a_value_that_the_spec_has_once() {
         assert_eq!(fix, replacement, "{bad}");
         assert!(fix.is_empty() || errors(fix).is_empty(), "{bad}: the fix is accepted");
     }
-    // In its place only; a value that is wrong has its own finding and no second one.
+    // Only at the entry; a wrong value has its own finding and no second one.
     let legs = |list: &str| with_list(&folder, "legs.toml", list);
     let noise = "assumed = [\"sensor.noise\"]\n";
     for (text, code, words) in [
@@ -108,7 +108,7 @@ fn each_entry_is_the_path_of_a_value_that_the_spec_has_once() {
         let [[id, said, ..]] = &found[..] else { panic!("{code}: {found:#?}") };
         assert!(id == code && said.contains(words), "{found:#?}");
     }
-    // As a user meets it, at the entry.
+    // The message as a user sees it, at the entry.
     folder.write(
         "own.toml",
         with_list(&folder, "reference.toml", "assumed = [\n    \"gauge\",\n    \"sensor.nois\",\n]\n"),
@@ -136,7 +136,7 @@ fn the_verdict_counts_them() {
     let (_, document) = json_of(&folder, &["dump-ir", "reference.toml"]);
     assert_eq!(document["result"]["assumed"].as_array().unwrap().len(), OF_REFERENCE + 1);
     assert!(folder.read("out/controller/src/identity.rs").contains("pub const ASSUMED: &[&str] = &["));
-    // All known, and a record of a leg: the verdict is as it was.
+    // All measured, with a record of a leg: the verdict is unchanged.
     let record = folder.read("records/reference-forc.csv");
     folder.write("records/reference-forc.csv", record.replacen(MARK, "", 1));
     folder.write("own.toml", with_list(&folder, "reference.toml", ""));
@@ -145,7 +145,7 @@ fn the_verdict_counts_them() {
     assert!(!run.stdout.contains("assumed"), "{}", run.stdout);
 }
 
-/// A file is known for simulated by itself: as a record, as a table made of it, by whoever wrote the mark.
+/// A file is marked as simulated itself, as a record and as a table made from it, whichever program wrote the mark.
 #[test]
 fn a_record_says_itself_that_it_is_simulated_and_so_does_what_is_made_of_it() {
     let folder = Folder::new();
@@ -167,7 +167,7 @@ fn a_record_says_itself_that_it_is_simulated_and_so_does_what_is_made_of_it() {
     assert!(run.stdout.contains("leg.csv: simulated: "), "{}", run.stdout);
     assert_eq!(json_of(&folder, &identify).1["result"]["measured"], json!([]));
     assert!(simulated("table.csv"));
-    // The same samples of a bench.
+    // The same samples from a real bench.
     let text = folder.read("leg.csv");
     let bare = text.replacen(MARK, "", 1);
     assert_ne!(text, bare);
@@ -190,7 +190,7 @@ fn a_record_says_itself_that_it_is_simulated_and_so_does_what_is_made_of_it() {
     assert_eq!(host_sim::forc::SIMULATED, specgen::identify::SIMULATED);
 }
 
-/// A board, an image for one and whatever would be written to it; nothing else asks.
+/// A board, an image for one, and everything written to it need confirmation; nothing else does.
 #[test]
 fn a_real_board_takes_assumptions_only_if_they_are_accepted() {
     let folder = Folder::new();
@@ -203,13 +203,13 @@ fn a_real_board_takes_assumptions_only_if_they_are_accepted() {
         "records/reference-forc.csv (simulated)",
         "--assumed-ok",
     ];
-    // `size` leaves the image, too.
+    // `size` also writes the image.
     let size = ["size", "reference.toml", "--target", "stm32h743", "--no-measure", "-o", "out"];
     for arguments in [&build[..], &flash, &size] {
         folder.run(arguments).says(1, &words);
         assert!(!folder.path("out").exists());
     }
-    // By the spec's own part, too; a list of its own, or a record alone, is enough.
+    // Also for the spec's own part; a list, or only a simulated record, is enough.
     let board = |text: String| text.replace("mcu = \"mps2-an500\"", "mcu = \"stm32h743zi\"");
     folder.write("own.toml", board(with_list(&folder, "reference.toml", "assumed = [\"sensor.noise\"]\n")));
     folder.run(&["build", "own.toml", "-o", "out"]).says(1, &["E0348", "1 assumed value, simulated leg record"]);
@@ -224,7 +224,7 @@ fn a_real_board_takes_assumptions_only_if_they_are_accepted() {
     if target::available().is_err() {
         return;
     }
-    // Behind that gate is the folder, which is another's.
+    // After that check comes the folder, which belongs to someone else.
     fs::create_dir(folder.path("out")).unwrap();
     folder.write("out/notes.txt", "mine");
     let accepted = [&build[..], &["--assumed-ok"]].concat();
@@ -258,7 +258,7 @@ fn a_new_spec_names_what_nobody_gave() {
         let assumed = document["result"]["assumed"].as_array().unwrap();
         let text = folder.read(&format!("{like}/platform.toml"));
         let marks = text.lines().filter(|line| line.ends_with("(assumed)") || line.ends_with("(computed)")).count();
-        // The places of six gauges, of which one has a comment for each of its two keys, are one entry.
+        // The positions of six gauges are one entry, although one of them has a comment for each of its two keys.
         let gauges = usize::from(like == "reference");
         assert_eq!(assumed.len(), marks - gauges, "{text}");
         assert!(list_of(&text).lines().all(|line| line.len() <= 120), "{text}");
@@ -287,7 +287,7 @@ fn a_new_spec_names_what_nobody_gave() {
 #[ignore = "long: seven verdicts, with their studies of the noise"]
 fn a_pose_that_is_noisier_at_rest_than_asked_for_is_not_good() {
     let folder = Folder::new();
-    // Spec, noise of a gauge, requirements; the headline and the key that sets the limit, or none where it is kept.
+    // Spec, noise of a gauge, requirements; the headline and the key of the limit, or none if it is met.
     for (spec, noise, requirements, expected) in [
         (
             "reference.toml",
@@ -308,7 +308,7 @@ fn a_pose_that_is_noisier_at_rest_than_asked_for_is_not_good() {
         ("legs.toml", "2.2 nm", "precision = \"20 nm\"", None),
     ] {
         let text = folder.read(spec).replace("noise = \"2.2 nm\"", &format!("noise = \"{noise}\""));
-        // As long a wiring check as the noise asks for.
+        // A wiring check as long as the noise requires.
         let supervisor = "[supervisor]\nwiring_check.time = \"5 s\"";
         let more = format!("{supervisor}\n\n[requirements]\n{requirements}\n\n[timing]");
         folder.write("own.toml", text.replace("[timing]", &more));

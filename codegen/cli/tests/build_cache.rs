@@ -1,4 +1,4 @@
-//! What was built is not built again, and nothing that was kept is believed.
+//! The build cache: nothing is built twice, and cached files are verified.
 
 #![cfg(unix)]
 
@@ -10,10 +10,10 @@ use std::process::{Command, Stdio};
 use crate::support::{Document, Folder, Run, length, skipped};
 use serde_json::Value;
 
-/// A folder with a `cargo` that counts what it builds, and a cache of its own.
-struct Counted(Folder);
+/// A folder with a `cargo` that counts its builds, and a separate cache.
+struct BuildCounter(Folder);
 
-impl Counted {
+impl BuildCounter {
     fn new() -> Self {
         let folder = Folder::new();
         let cargo = specgen::target::find_program("cargo").unwrap();
@@ -36,7 +36,7 @@ impl Counted {
         command
     }
 
-    /// Runs it well; how often cargo was run to build.
+    /// Runs a command that succeeds, and returns how often cargo was called to build.
     fn builds(&self, arguments: &[&str]) -> usize {
         self.builds_with(&mut self.command(arguments)).0
     }
@@ -52,7 +52,7 @@ impl Counted {
         fs::read_to_string(self.0.path("runs")).map_or(0, |text| text.lines().count())
     }
 
-    /// What `specgen cache` says, as JSON.
+    /// The result of `specgen cache` as JSON.
     fn cache(&self, arguments: &[&str]) -> Value {
         Document::of(&Run::of(&mut self.command(arguments))).value["result"].clone()
     }
@@ -79,136 +79,136 @@ fn flip(bytes: &mut [u8]) {
 
 #[test]
 fn an_unchanged_spec_is_built_once_and_everything_else_anew() {
-    let counted = Counted::new();
-    let folder = &counted.0;
-    assert_eq!(counted.builds(&SIM), 1);
+    let counter = BuildCounter::new();
+    let folder = &counter.0;
+    assert_eq!(counter.builds(&SIM), 1);
     let recorded = fs::read(folder.path("run.rec")).unwrap();
 
-    // A cargo that fails is not asked.
+    // A failing cargo is not called.
     folder.write("broken", "");
     for command in [&SIM[..], &REPLAY] {
-        assert_eq!(counted.builds(command), 0, "{command:?}");
+        assert_eq!(counter.builds(command), 0, "{command:?}");
     }
     assert_eq!(fs::read(folder.path("run.rec")).unwrap(), recorded);
-    // What the environment says of profiles and flags reaches no build, so it asks for no other.
-    let mut set = counted.command(&SIM);
+    // Profiles and flags in the environment reach no build, so they cause no other build.
+    let mut set = counter.command(&SIM);
     set.env("CARGO_PROFILE_RELEASE_OPT_LEVEL", "0").env("RUSTFLAGS", "-Copt-level=0").env("CARGO_INCREMENTAL", "1");
-    assert_eq!(counted.builds_with(&mut set).0, 0);
-    // Unless the cache is left out.
+    assert_eq!(counter.builds_with(&mut set).0, 0);
+    // Without the cache it is built again.
     let uncached = [&SIM[..], &["--no-cache"]].concat();
-    assert_eq!(Run::of(&mut counted.command(&uncached)).code, 3);
-    assert_eq!(Run::of(counted.command(&SIM).env("SPECGEN_CACHE", "")).code, 3);
+    assert_eq!(Run::of(&mut counter.command(&uncached)).code, 3);
+    assert_eq!(Run::of(counter.command(&SIM).env("SPECGEN_CACHE", "")).code, 3);
     fs::remove_file(folder.path("broken")).unwrap();
 
     if length(true, false) {
-        // What asks for a build is known by that, without one.
+        // Commands that need a build are recognised by that.
         folder.write("broken", "");
         let asks = |arguments: &[&str]| {
             let _ = fs::remove_file(folder.path("runs"));
-            let run = Run::of(&mut counted.command(arguments));
-            assert_eq!((run.code, counted.runs()), (3, 1), "{arguments:?}: {run:#?}");
+            let run = Run::of(&mut counter.command(arguments));
+            assert_eq!((run.code, counter.runs()), (3, 1), "{arguments:?}: {run:#?}");
             run.stderr
         };
-        let [entry] = counted.entries().try_into().unwrap();
+        let [entry] = counter.entries().try_into().unwrap();
         edit(&entry, |bytes| flip(bytes));
         assert_eq!(asks(&REPLAY).matches("warning: a cached build was damaged").count(), 1);
-        assert!(counted.entries().is_empty());
+        assert!(counter.entries().is_empty());
         folder.write("legs.toml", folder.read("legs.toml").replace("name = \"", "name = \"other-"));
         asks(&SIM);
         return skipped("only in the full run: what was damaged and another source are built");
     }
-    // Damaged: found, said, removed, built, with the same result.
+    // A damaged entry is detected, reported, removed and rebuilt, with the same result.
     // (Every bit and every cut of an entry: the unit tests of the cache.)
-    let [entry] = counted.entries().try_into().unwrap();
+    let [entry] = counter.entries().try_into().unwrap();
     edit(&entry, |bytes| flip(bytes));
-    let (builds, run) = counted.builds_with(&mut counted.command(&REPLAY));
+    let (builds, run) = counter.builds_with(&mut counter.command(&REPLAY));
     assert_eq!(builds, 1);
     assert_eq!(run.stderr.matches("warning: a cached build was damaged").count(), 1, "{}", run.stderr);
-    assert_eq!(counted.builds(&REPLAY), 0);
+    assert_eq!(counter.builds(&REPLAY), 0);
 
     // Another source.
     let text = folder.read("legs.toml");
     folder.write("legs.toml", text.replace("name = \"", "name = \"other-"));
-    assert_eq!((counted.builds(&SIM), counted.builds(&SIM)), (1, 0));
-    assert_eq!(counted.entries().len(), 2);
-    // Looked at and emptied.
-    let shown = counted.cache(&["cache", "--json"]);
+    assert_eq!((counter.builds(&SIM), counter.builds(&SIM)), (1, 0));
+    assert_eq!(counter.entries().len(), 2);
+    // Listing and clearing.
+    let shown = counter.cache(&["cache", "--json"]);
     assert_eq!(shown["builds"], 2, "{shown}");
     assert!(shown["bytes"].as_u64().unwrap() > 10_000 && shown["removed"] == 0, "{shown}");
-    let cleared = counted.cache(&["cache", "--clear", "--json"]);
+    let cleared = counter.cache(&["cache", "--clear", "--json"]);
     assert_eq!((&cleared["removed"], &cleared["builds"], &cleared["bytes"]), (&2.into(), &0.into(), &0.into()));
-    assert!(counted.entries().is_empty());
-    let empty = Run::of(counted.command(&["cache"]).env("SPECGEN_CACHE", ""));
+    assert!(counter.entries().is_empty());
+    let empty = Run::of(counter.command(&["cache"]).env("SPECGEN_CACHE", ""));
     assert!(empty.code == 0 && empty.stdout.starts_with("no builds are kept"), "{empty:?}");
 }
 
 #[test]
 #[ignore = "long: a controller built beside itself"]
 fn two_at_once_keep_one_build() {
-    let counted = Counted::new();
+    let counter = BuildCounter::new();
     let commands =
         ["a.rec", "run.rec"].map(|file| ["sim", "legs.toml", "--emitted", "--record", file, "--seconds", "0.1"]);
     let started = commands
-        .map(|arguments| counted.command(&arguments).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap());
+        .map(|arguments| counter.command(&arguments).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap());
     for child in started {
         let output = child.wait_with_output().unwrap();
         assert!(output.status.success(), "{output:?}");
     }
-    assert_eq!(counted.entries().len(), 1);
-    assert_eq!(counted.builds(&REPLAY), 0);
-    assert_eq!(fs::read(counted.0.path("a.rec")).unwrap(), fs::read(counted.0.path("run.rec")).unwrap());
+    assert_eq!(counter.entries().len(), 1);
+    assert_eq!(counter.builds(&REPLAY), 0);
+    assert_eq!(fs::read(counter.0.path("a.rec")).unwrap(), fs::read(counter.0.path("run.rec")).unwrap());
 }
 
 #[test]
 #[ignore = "long: two controllers built without a cache"]
 fn a_cache_that_cannot_be_written_costs_one_line() {
-    let counted = Counted::new();
-    let mut nowhere = counted.command(&SIM);
-    let (builds, run) = counted.builds_with(nowhere.env("SPECGEN_CACHE", "/dev/null/cache"));
+    let counter = BuildCounter::new();
+    let mut nowhere = counter.command(&SIM);
+    let (builds, run) = counter.builds_with(nowhere.env("SPECGEN_CACHE", "/dev/null/cache"));
     assert_eq!(builds, 1);
     assert_eq!(run.stderr.matches("warning: the build could not be cached").count(), 1, "{}", run.stderr);
-    let mut nowhere = counted.command(&SIM);
-    let (builds, run) = counted.builds_with(nowhere.arg("--json").env("SPECGEN_CACHE", "/dev/null/cache"));
+    let mut nowhere = counter.command(&SIM);
+    let (builds, run) = counter.builds_with(nowhere.arg("--json").env("SPECGEN_CACHE", "/dev/null/cache"));
     assert_eq!((builds, run.stderr.as_str()), (1, ""));
 }
 
 #[test]
 #[ignore = "long: five builds without a cache"]
 fn what_lies_in_the_output_folder_is_not_believed() {
-    let counted = Counted::new();
+    let counter = BuildCounter::new();
     let build = ["build", "minimal.toml", "--target", "host", "-o", "out", "--json"];
     let artifact = |command: &mut Command| {
-        let (builds, run) = counted.builds_with(command);
+        let (builds, run) = counter.builds_with(command);
         let document = Document::of(&run);
-        (builds, counted.0.path(document.value["result"]["artifact"].as_str().unwrap()))
+        (builds, counter.0.path(document.value["result"]["artifact"].as_str().unwrap()))
     };
-    let (builds, library) = artifact(&mut counted.command(&build));
+    let (builds, library) = artifact(&mut counter.command(&build));
     assert_eq!(builds, 1);
     let good = fs::read(&library).unwrap();
-    // Cargo has made a lock file, which says nothing.
-    assert_eq!((counted.0.path("out/Cargo.lock").is_file(), counted.builds(&build)), (true, 0));
+    // Cargo has written a lock file, which proves nothing.
+    assert_eq!((counter.0.path("out/Cargo.lock").is_file(), counter.builds(&build)), (true, 0));
 
     // The library under the name of its digest.
     let damages: [fn(&mut Vec<u8>); 2] = [|bytes| flip(bytes), |bytes| bytes.truncate(100)];
     for damage in damages {
         edit(&library, damage);
-        assert_eq!(artifact(&mut counted.command(&build)), (0, library.clone()));
+        assert_eq!(artifact(&mut counter.command(&build)), (0, library.clone()));
         assert!(fs::read(&library).unwrap() == good);
     }
-    // What cargo made itself, without a cache that would know better: sources are written anew, so it compiles.
+    // Cargo's own output, without the cache: sources are rewritten, so cargo compiles them.
     let made = library.with_file_name(format!(
         "{}controller_host{}",
         std::env::consts::DLL_PREFIX,
         std::env::consts::DLL_SUFFIX
     ));
     let uncached = [&build[..], &["--no-cache"]].concat();
-    assert_eq!(artifact(&mut counted.command(&uncached)), (1, library.clone()));
+    assert_eq!(artifact(&mut counter.command(&uncached)), (1, library.clone()));
     edit(&made, |bytes| flip(bytes));
-    assert_eq!(artifact(&mut counted.command(&uncached)), (1, library.clone()));
+    assert_eq!(artifact(&mut counter.command(&uncached)), (1, library.clone()));
     assert!(fs::read(&library).unwrap() == good && fs::read(&made).unwrap() == good);
 
-    // What cargo is configured with.
-    fs::create_dir(counted.0.path(".cargo")).unwrap();
-    counted.0.write(".cargo/config.toml", "[profile.release]\ndebug = 0\n");
-    assert_eq!((counted.builds(&build), counted.builds(&build)), (1, 0));
+    // Cargo's configuration.
+    fs::create_dir(counter.0.path(".cargo")).unwrap();
+    counter.0.write(".cargo/config.toml", "[profile.release]\ndebug = 0\n");
+    assert_eq!((counter.builds(&build), counter.builds(&build)), (1, 0));
 }

@@ -1,4 +1,4 @@
-//! The command as a user meets it: exit codes, `--json`, help, and what it says about arguments and files that are wrong.
+//! The command as a user sees it: exit codes, `--json`, help, and messages about wrong arguments and files.
 
 use crate::support;
 use std::ffi::OsString;
@@ -119,14 +119,14 @@ fn arguments_that_make_no_sense_are_usage_errors() {
     ];
     for (number, (arguments, word)) in cases.iter().enumerate() {
         folder.run(arguments).says(2, &["error: ", word]);
-        // For programs one of four in the short run.
+        // As JSON, one of four in the short run.
         if !number.is_multiple_of(support::length(4, 1)) {
             continue;
         }
         let document = folder.json(arguments);
         assert_eq!(document.code, 2, "{arguments:?}");
         assert!(document.error().contains(word), "{arguments:?}: {}", document.error());
-        // Those that were found in the spec before stay: they are warnings.
+        // Earlier findings of the spec are kept: they are warnings.
         assert!(document.findings().is_empty() || arguments.contains(&"reference.toml"));
     }
     assert_eq!(folder.listing(), before);
@@ -145,7 +145,7 @@ fn every_command_explains_itself() {
         assert_eq!((help.code, help.stderr.as_str()), (0, ""));
         let text = &help.stdout;
         assert!(text.contains(&format!("Usage: specgen {command}")) && text.contains("--json"), "{text}");
-        // Every option and argument has a sentence, beside it or below; deeper lines are the rest of one.
+        // Every option and argument has a sentence, on its line or below; deeper lines continue it.
         let depth = |line: &str| line.len() - line.trim_start().len();
         let (options, _) = text.split_once("\nExamples:\n").unwrap();
         let lines: Vec<&str> = options.lines().chain([""]).collect();
@@ -199,7 +199,7 @@ fn a_good_spec_gives_one_document_and_its_text_the_same_facts() {
     assert_eq!((text.code, &check.value["result"]["verdict"]["answer"]), (0, &"not-measured".into()));
     let details = folder.run(&["check", "legs.toml", "--details"]).stdout;
     assert!(details.starts_with(&text.stdout) && details.contains("\n  record records/"), "{details}");
-    // What a check cannot measure is a note, and so is where legs and gauges end; nothing else is said.
+    // Only notes: about what a check cannot measure, and about the ranges of legs and gauges.
     assert!(text.stderr.starts_with("note[N0872]") && text.stderr.ends_with("0 errors, 0 warnings\n"), "{text:#?}");
 
     let ir = folder.json(&["dump-ir", "legs.toml"]);
@@ -209,7 +209,7 @@ fn a_good_spec_gives_one_document_and_its_text_the_same_facts() {
     assert_eq!(plain["digest"], digest);
 }
 
-/// What is said first is short: ten lines of eighty letters.
+/// Asserts that the text starts with a verdict of at most ten lines of eighty letters.
 fn is_a_verdict(text: &str, start: &str) {
     assert!(text.starts_with(start), "{text}");
     assert!(text.lines().count() <= 10 && text.lines().all(|line| line.chars().count() <= 80), "{text}");
@@ -238,7 +238,7 @@ fn sim_gives_one_document_and_its_files_hold_the_same_table() {
         let trace = folder.read(&format!("out/sim/trace-{mode}-1hz.csv"));
         assert!(trace.lines().count() > 40, "{mode}");
     }
-    // Of its own legs there is no word about the paper.
+    // The result for the spec's own legs does not mention the paper.
     let own = ["sim", "legs.toml", "--frequency", "10", "--plot", "plots/own.svg", "-o", "own", "--traces"];
     let own = folder.run(&own);
     assert!(own.code == 0 && !own.stdout.contains("paper") && own.stdout.contains("pcc"), "{own:?}");
@@ -251,7 +251,7 @@ fn sim_gives_one_document_and_its_files_hold_the_same_table() {
     {
         assert!(trace.lines().next().unwrap().split(',').any(|column| column == name), "{name}");
     }
-    // Another interval is judged as the period of the spec is.
+    // Another interval is checked like the period of the spec.
     folder.run(&["sim", "legs.toml", "--frequency", "10", "--samples", "2000"]).says(1, &["50.0 µs", "timing.period"]);
     folder.json(&["sim", "nothing.toml"]).finding("E0101");
     let refused = folder.json(&["sim", "legs.toml", "--plant", "legs.toml"]);
@@ -273,7 +273,7 @@ fn a_simulated_record_can_be_identified() {
     assert!(folder.read("table.csv").starts_with("up_V,down_V,everett_um\n"));
     let text = folder.run(&arguments);
     assert!(text.code == 0 && text.stdout.contains("8 reversal curves") && text.stdout.contains("wrote table.csv"));
-    // Another seed is another noise; the same seed the same bytes.
+    // Another seed gives other noise; the same seed gives the same bytes.
     folder.run(&["forc", "-o", "again.csv", "--grid", "8"]);
     folder.run(&["forc", "-o", "other.csv", "--grid", "8", "--seed", "2"]);
     assert_eq!(folder.read("record.csv"), folder.read("again.csv"));
@@ -361,7 +361,7 @@ fn several_mistakes_are_reported_together() {
     folder.run(&["check", "bad.toml"]).says(1, &["bad.toml is refused; nothing was written", "--> bad.toml:"]);
 }
 
-/// A name that is no UTF-8 is as good as any: what the file says counts, and the name reaches no output.
+/// A name need not be UTF-8: only the content of the file matters, and the name reaches no output.
 #[test]
 fn a_file_name_that_is_not_utf_8_is_read_or_refused_but_never_fatal() {
     let folder = Folder::new();
@@ -380,7 +380,7 @@ fn a_file_name_that_is_not_utf_8_is_read_or_refused_but_never_fatal() {
     let made = Run::of(folder.command().args(["legs.toml", "--no-build", "-o"]).arg(&output));
     assert_eq!(made.code, 0, "{}", made.stderr);
     assert!(folder.path(&output).join("Cargo.toml").is_file());
-    // As a record: no such name can stand in a spec, but on the command line.
+    // As a record: such a name is possible on the command line, but not in a spec.
     fs::copy(folder.path("records/leg1.csv"), folder.path(&name)).unwrap();
     let mut identify = folder.command();
     identify.arg("identify").arg(&name).args(["--drive", "0:100", "--grid", "8", "--json"]);
@@ -428,7 +428,7 @@ fn a_file_that_cannot_be_written_is_named() {
         }
     }
     assert_eq!(folder.listing(), before);
-    // What is missing above a file is made.
+    // Missing parent folders are created.
     assert_eq!(folder.run(&["forc", "--grid", "4", "-o", "new/below/record.csv"]).code, 0);
     assert!(folder.path("new/below/record.csv").is_file());
 }
@@ -466,7 +466,7 @@ fn a_computer_is_judged_by_the_period_of_a_spec() {
         assert_eq!(finding["fix"].is_null(), good, "{finding}");
     }
 
-    // With a spec the verdict is the exit code, and the figures come all the same.
+    // With a spec the verdict decides the exit code; the figures are printed in any case.
     let judged = folder.run(&["doctor", "legs.toml", "--seconds", "0.2", "--json"]);
     let document: serde_json::Value = serde_json::from_str(&judged.stdout).unwrap();
     let result = &document["result"];
@@ -474,5 +474,7 @@ fn a_computer_is_judged_by_the_period_of_a_spec() {
     assert_eq!(judged.code, i32::from(bad));
     assert_eq!(bad, result["latency"]["skipped"] != 0);
     let text = folder.run(&["doctor", "--seconds", "0.1"]);
-    assert!(text.stdout.contains("wake-up delays, from the planned time to running") && text.stdout.contains("10000 Hz: "));
+    assert!(
+        text.stdout.contains("wake-up delays, from the planned time to running") && text.stdout.contains("10000 Hz: ")
+    );
 }

@@ -1,4 +1,4 @@
-//! What the hand-written documents name is there: links, files, tests, commands and their options.
+//! Links, files, tests, commands and options that the hand-written documents mention exist.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -16,7 +16,7 @@ fn read(name: &str) -> String {
     fs::read_to_string(repository().join(name)).unwrap()
 }
 
-/// Texts between backticks, code blocks left out.
+/// Texts between backticks, outside of code blocks.
 fn quoted(text: &str) -> Vec<String> {
     let plain: String = text.split("```").step_by(2).collect();
     plain.split('`').skip(1).step_by(2).map(str::to_owned).collect()
@@ -62,7 +62,7 @@ fn files_and_folders_that_are_named_exist() {
     assert!(found > 20, "{found} paths");
 }
 
-/// A typical change is made in few places, and they are there.
+/// A typical change needs few files, and they exist.
 #[test]
 fn a_typical_change_touches_at_most_three_files() {
     let text = read("CONTRIBUTING.md");
@@ -104,7 +104,7 @@ fn tests_that_figures_come_from_exist() {
     }
 }
 
-/// Each `specgen …` in the text is a command that there is, with options that its help explains, or the main job on a spec.
+/// Each `specgen …` in the text is an existing command, with options from its help, or the main job on a spec.
 #[test]
 fn commands_and_options_of_the_documents_are_those_of_the_program() {
     let folder = Folder::new();
@@ -166,7 +166,7 @@ fn the_example_in_c_runs() {
     assert!(volts.len() == 6 && volts.iter().all(|volts| (1.0..=100.0).contains(volts)), "{}", run.stdout);
 }
 
-/// The status bits of the page are those of the emitted controller.
+/// The status bits of the page match the emitted controller.
 #[test]
 fn status_bits_are_those_that_are_emitted() {
     let page = read("docs/control-law.md");

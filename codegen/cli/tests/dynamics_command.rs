@@ -82,14 +82,14 @@ fn bad_states_are_refused_in_words() {
     folder.run(&["dynamics", "reference.toml", "--states", "none.csv"]).says(1, &["none.csv", "cannot be read"]);
 }
 
-/// Everything that is written as a number, without a parser of JSON.
+/// All numbers in the text, without a JSON parser.
 fn number_texts(document: &str) -> Vec<String> {
     let pieces = document.split(|c: char| c.is_ascii_whitespace() || "[]{},:".contains(c));
     pieces.filter(|piece| piece.parse::<f64>().is_ok()).map(str::to_owned).collect()
 }
 
-/// How many of `texts` the binary reads as another number than the nearest double: they go in as rates and accelerations,
-/// which the result repeats. The nearest double by `core`, which reads any decimal exactly.
+/// Number of `texts` that the binary does not parse as the nearest double. They are passed as rates and accelerations, which the
+/// result repeats. The nearest double is that of `core`, which parses every decimal exactly.
 fn misread(texts: &[String]) -> usize {
     let folder = Folder::new();
     let state = |texts: &[String]| {
@@ -142,7 +142,7 @@ fn no_double_is_misread_however_it_is_written() {
     .map(str::to_owned)
     .to_vec();
     for k in 0..30_000 {
-        // Every tenth a subnormal, which the shift makes of any bits.
+        // Every tenth is a subnormal, because of the shift.
         let bits = random.next_u64();
         let value = f64::from_bits(if k % 10 == 0 { bits >> 12 } else { bits });
         if !value.is_finite() {

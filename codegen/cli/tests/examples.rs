@@ -1,4 +1,4 @@
-//! The examples of every help text run as they stand; commands in documents are at least such that the program takes them.
+//! The examples of every help text run unchanged; the program accepts the commands in documents.
 
 #![allow(clippy::disallowed_methods, reason = "what stands in a test is emitted nowhere")]
 use crate::support;
@@ -57,7 +57,7 @@ fn prepared() -> Folder {
         let row = |k: u32| {
             let time = f64::from(k) / 400.0 / frequency;
             let drive = 50.0 - 40.0 * (TAU * frequency * time).cos();
-            // What is left of the line is not nothing, or there would be no error to state.
+            // The residual must not be zero, or there would be no standard error.
             [time, drive, 0.6 + 0.1262 * drive + 1e-4 * (f64::from(k) * 1.7).sin()]
         };
         write(name, "time_s,drive_V,displacement_um", &mut (0..=1600).map(row));
@@ -95,7 +95,7 @@ fn prepared() -> Folder {
 fn examples_run_as_they_stand() {
     let folder = prepared();
     let mut lines: Vec<Line> = Vec::new();
-    // What tests of their own run: `export`, `fmu`, `tune`, `robust` and, in the full run, `platform_tables`.
+    // Other tests run these: `export`, `fmu`, `tune`, `robust` and, in the full run, `platform_tables`.
     let elsewhere = [
         "specgen export",
         "learning.toml --from",
@@ -124,7 +124,7 @@ fn examples_run_as_they_stand() {
     for line in &lines {
         let start = Instant::now();
         let learns = line.text.contains("learn learning.toml -o case-1.json");
-        // Where learning converges is searched for over fewer frequencies; the grid is not.
+        // Fewer frequencies, to shorten the search for convergence; a fixed grid, instead of a search.
         let less = match (learns, line.text.contains("--columns")) {
             (true, _) => support::length(" --bandwidth 100 --passes 1", ""),
             (_, true) => support::length(" --grid 32", ""),
@@ -156,11 +156,11 @@ fn examples_run_as_they_stand() {
     }
 }
 
-/// Documents by name, with what they say.
+/// Documents: name and text.
 fn documents() -> Vec<(String, String)> {
     let names = ["README.md", "ARCHITECTURE.md"].map(str::to_owned).into_iter().chain(pages());
     let read = |name: String| (name.clone(), fs::read_to_string(repository().join(name)).unwrap());
-    // Of the generated pages those that have commands.
+    // Generated pages with commands.
     let findings = ("findings".to_owned(), specgen::findings::reference_markdown());
     let keys = ("keys".to_owned(), specgen::spec::reference_markdown());
     names.map(read).chain([findings, keys]).collect()
@@ -198,7 +198,7 @@ fn commands_in_documents_are_those_of_the_program() {
     assert!(count > 40, "{count} commands");
 }
 
-/// Within a sentence an argument may be left out; a command or an option that is not there may not stand anywhere.
+/// Within a sentence an argument may be omitted, but commands and options must exist.
 #[test]
 fn commands_within_sentences_are_those_of_the_program() {
     let mut count = 0;
@@ -207,7 +207,7 @@ fn commands_within_sentences_are_those_of_the_program() {
         for quoted in plain.split('`').skip(1).step_by(2).filter(|quoted| !quoted.contains(['[', '|', '…', '\n'])) {
             let Some(line) = Line::of(&name, quoted) else { continue };
             let [_, first, ..] = line.words.as_slice() else { continue };
-            // Whatever is no command is taken for a spec.
+            // Other words are taken as a spec.
             assert!(is_known(first) || first.contains(".toml") || first == "SPEC", "{name}: `{quoted}`");
             let parsed = specgen::cli::command().try_get_matches_from(&line.words);
             if let Err(error) = parsed {
@@ -226,7 +226,7 @@ fn commands_within_sentences_are_those_of_the_program() {
     assert!(count > 60, "{count} commands");
 }
 
-/// The judge sees what it is there for.
+/// The check detects errors.
 #[test]
 fn a_command_that_is_not_there_is_seen() {
     let fault = |text: &str| Line::of("here", text).unwrap().fault();
@@ -274,7 +274,7 @@ fn completions_load_in_their_shell_and_name_every_command() {
             Err(_) => support::skipped(&format!("no {shell}: its script is not loaded")),
         }
     }
-    // As a user's bash has it after loading: the function is registered, completes a command, its options, and leaves files to bash.
+    // In a user's bash after loading: the function is registered, completes a command and its options, and leaves files to bash.
     let typed = |words: &str, current: &str, before: &str| {
         format!(
             "source ./bash; COMP_WORDS=({words}); COMP_CWORD=$((${{#COMP_WORDS[@]}} - 1)); _specgen specgen '{current}' '{before}'; echo \"${{COMPREPLY[@]}}\""

@@ -8,7 +8,7 @@ use host_sim::controller::{Controller, Supervised, TickController};
 
 const TICKS: u64 = 1000;
 
-/// What example.c gives its controller, by Rust; each gauge off by so many ulps.
+/// Digest after the inputs of example.c, computed in Rust, with each gauge off by some ulps.
 fn digest(folder: &Folder, dir: &str, ulps: u64) -> u64 {
     let library = folder.path(dir).join("libcontroller.so");
     let mut machine = Supervised::new(Controller::load(&library).unwrap());
@@ -54,7 +54,7 @@ fn a_program_in_c_links_the_controller_and_gets_its_bits() {
             let text = String::from_utf8(ran.stdout).unwrap();
             assert!(ran.status.success() && text.contains(&wanted), "{compiler}: {text} for {wanted}");
         }
-        // The library of another spec is not taken.
+        // The library of another spec is refused.
         let header = folder.path(dir).join("controller.h");
         let other = std::fs::read_to_string(&header).unwrap();
         let line = other.lines().find(|line| line.starts_with("#define SPECGEN_DIGEST")).unwrap();
@@ -66,7 +66,7 @@ fn a_program_in_c_links_the_controller_and_gets_its_bits() {
     }
 }
 
-/// What the test in C does, and what a hand could do wrong.
+/// The test in C, and a possible mistake.
 const SCRIPT: &str = "
 import sys
 from controller import Controller
@@ -113,7 +113,7 @@ fn a_module_in_python_steps_the_controller_and_gets_its_bits() {
             String::from_utf8_lossy(&ran.stderr)
         );
         assert!(text.contains("mode is out of its range") && text.contains("modus: expected one of mode, "), "{text}");
-        // The library of another spec is not taken.
+        // The library of another spec is refused.
         let module = folder.read(&format!("{dir}/controller.py"));
         let other = module.replace("DIGEST = \"", "DIGEST = \"0");
         folder.write(&format!("{dir}/controller.py"), other);

@@ -1,5 +1,5 @@
-//! Files that arguments name, over every argument of every command: what is read is never written, and nothing waits for what is no
-//! plain file. The arguments come from the program's own description, so that a new one is tried as soon as it is there.
+//! File arguments of all commands: inputs are never overwritten, and no command blocks on a file that is not regular. The arguments
+//! come from the program's own description, so that new ones are tested automatically.
 
 #![allow(clippy::disallowed_methods, reason = "what stands in a test is emitted nowhere")]
 use std::collections::BTreeMap;
@@ -15,11 +15,10 @@ use specgen::cli::{Role, role};
 
 use crate::support::{BINARY, Folder, Run, length};
 
-/// Whoever has not ended by then waits for something.
+/// A command that has not ended by then is blocked.
 const PATIENCE: Duration = Duration::from_secs(60);
 
-/// For each command, arguments with which it reads every file that it is given: by name, with their values. Those that it has no use for
-/// stand below `OTHERS`.
+/// For each command, arguments by name with which it reads every given file. Commands without files are in `OTHERS`.
 const LINES: &[(&str, &[(&str, &str)])] = &[
     ("specgen", &[("spec", "legs.toml"), ("no_build", "")]),
     ("specgen new", &[("name", "new"), ("like", "reference")]),
@@ -56,10 +55,10 @@ const LINES: &[(&str, &[(&str, &str)])] = &[
     ("specgen doctor", &[("spec", "legs.toml")]),
     ("specgen dump-ir", &[("spec", "legs.toml")]),
 ];
-/// Commands that name no file, or have none of their own.
+/// Commands without file arguments.
 const WITHOUT: [&str; 6] =
     ["specgen explain", "specgen export", "specgen lsp", "specgen cache", "specgen completions", "specgen help"];
-/// Arguments for files that have no type of their own: a folder beside the spec, and words of which some are files.
+/// Path arguments without a path type: a folder relative to the spec, and words of which some are files.
 const UNTYPED: [&str; 2] = ["specgen identify gains output", "specgen operate words"];
 
 /// An argument that names a file.
@@ -76,7 +75,7 @@ impl Slot {
         format!("{} {}", self.command, self.argument.get_id())
     }
 
-    /// The words of a line in which this argument, and then others, have the given values.
+    /// The words of a line with the given values for this argument and others.
     fn line(&self, values: &[(&str, &str)]) -> Vec<String> {
         let own = LINES.iter().find(|(command, _)| *command == self.command);
         let (_, usual) = own.unwrap_or_else(|| panic!("{}: add its line to LINES", self.command));
@@ -98,7 +97,7 @@ impl Slot {
         words
     }
 
-    /// The line with this argument alone changed.
+    /// The line with only this argument changed.
     fn with(&self, value: &str) -> Vec<String> {
         self.line(&[(self.argument.get_id().as_str(), value)])
     }
@@ -124,7 +123,7 @@ fn slots() -> Vec<Slot> {
     found
 }
 
-/// What the lines of [`LINES`] name.
+/// A folder with the files of [`LINES`].
 fn prepared() -> Folder {
     let folder = Folder::new();
     let learning = folder.read("reference.toml").replacen("[control]\n", "[control]\ncorrection = \"2 um\"\n", 1);
@@ -210,8 +209,8 @@ fn every_argument_for_a_file_says_what_it_is_for() {
     assert!(count(Role::Input) > 40 && count(Role::Output) > 15 && seen > 60, "{seen}");
 }
 
-/// A pipe without a writer, a device without an end, a file of a terabyte, and none at all: each is refused at once, with one
-/// exit code, by a message that names it.
+/// A pipe without a writer, an endless device, a file of a terabyte, and a missing file are refused immediately, with the same exit
+/// code and a message with the name.
 #[test]
 fn an_input_that_is_no_plain_file_is_refused_by_every_command() {
     let folder = prepared();
@@ -227,7 +226,7 @@ fn an_input_that_is_no_plain_file_is_refused_by_every_command() {
     let inputs = slots.iter().filter(|slot| slot.role == Role::Input);
     let mut tried = 0;
     for (number, slot) in inputs.enumerate() {
-        // One of the kinds each in the short run.
+        // In the short run, one kind for each.
         for (name, words) in length(vec![kinds[number % 4]], kinds.to_vec()) {
             let run = run(&folder, &slot.with(name));
             let text = format!("{}{}", run.stdout, run.stderr);
@@ -237,7 +236,7 @@ fn an_input_that_is_no_plain_file_is_refused_by_every_command() {
             tried += 1;
         }
     }
-    // Whoever answers there is no file; nobody waits for it all the same.
+    // A missing endpoint has another message, but must not block either.
     for slot in slots.iter().filter(|slot| slot.role == Role::Endpoint) {
         let own = slot.argument.get_id().as_str();
         let other = if own == "port" { "socket" } else { "port" };
@@ -264,7 +263,7 @@ fn names(folder: &Folder, input: &str) -> Vec<String> {
     vec![input.to_owned(), format!("./{input}"), link, hard]
 }
 
-/// Every output of every command, with each of its inputs named there, under each of its names.
+/// Every output of every command, set to each of its inputs, under each name of that file.
 #[test]
 fn no_output_replaces_an_input() {
     let folder = prepared();
@@ -272,16 +271,16 @@ fn no_output_replaces_an_input() {
     let mut pairs = 0;
     for output in slots.iter().filter(|slot| slot.role == Role::Output) {
         for input in slots.iter().filter(|slot| slot.role == Role::Input && slot.command == output.command) {
-            // A plot says by its name what it is.
+            // The name of a plot determines its format.
             let name = if output.argument.get_id() == "plot" { "input.svg" } else { "input.toml" };
             folder.write(name, "what the user has measured");
             let id = input.argument.get_id().as_str();
-            // One of the names each in the short run.
+            // In the short run, one name for each.
             let names = names(&folder, name);
             for other in length(vec![names[pairs % 4].clone()], names) {
                 let words = output.line(&[(id, name), (output.argument.get_id().as_str(), &other)]);
                 let run = run(&folder, &words);
-                // Some arguments exclude each other, and that is said first.
+                // Some arguments exclude each other, which is reported first.
                 assert!(run.code == 2, "{words:?}: {run:#?}");
                 let told = ["is an input of this command", "cannot be used with"];
                 assert!(told.iter().any(|words| run.stderr.contains(words)), "{words:?}: {run:#?}");
@@ -294,7 +293,7 @@ fn no_output_replaces_an_input() {
     println!("{pairs} pairs of an input and an output");
 }
 
-/// As the commands were when they lost data, and files that only a spec names.
+/// Commands that once lost data, and files that only a spec names.
 #[test]
 fn data_is_where_it_was() {
     let folder = prepared();
@@ -342,18 +341,18 @@ fn what_cannot_be_written_is_left_alone() {
         }
         assert_eq!(folder.listing(), before, "{}", slot.name());
     }
-    // The spec that tuning would write into.
+    // The spec that `tune` would write.
     folder.write("own.toml", folder.read("legs.toml"));
     fs::set_permissions(folder.path("own.toml"), fs::Permissions::from_mode(0o400)).unwrap();
     folder.run(&["tune", "own.toml", "--write"]).says(3, &["own.toml", "write-protected"]);
-    // A pipe that nobody reads ends the command, and stays a pipe.
+    // A pipe without a reader ends the command, and remains a pipe.
     mkfifoat(CWD, folder.path("pipe"), Mode::RWXU).unwrap();
     let words = ["forc", "--grid", "4", "-o", "pipe"].map(str::to_owned);
     let run = run(&folder, &words);
     assert!(run.code == 3 && run.stderr.contains("no program reads this pipe"), "{run:#?}");
 }
 
-/// What the spec names belongs to it, though the command does not read it.
+/// Files named by the spec are inputs, even if the command does not read them.
 #[test]
 fn no_output_replaces_a_table_of_the_spec() {
     let folder = Folder::new();
@@ -365,7 +364,7 @@ fn no_output_replaces_a_table_of_the_spec() {
     assert_eq!(folder.read("waves/w.csv"), "x_um\n0\n1\n0\n");
 }
 
-/// Files that a command writes together are all written or none.
+/// A command writes either all of its files or none.
 #[test]
 fn of_several_outputs_none_is_written_if_one_cannot_be() {
     let folder = Folder::new();
@@ -386,7 +385,7 @@ fn of_several_outputs_none_is_written_if_one_cannot_be() {
     assert_eq!(folder.read("rep.html"), "mine");
 }
 
-/// What replaces a file has its permissions.
+/// A replaced file keeps its permissions.
 #[test]
 fn a_file_that_others_may_not_read_stays_one() {
     let folder = Folder::new();
@@ -397,7 +396,7 @@ fn a_file_that_others_may_not_read_stays_one() {
     assert_eq!(fs::metadata(folder.path("curves.csv")).unwrap().permissions().mode() & 0o777, 0o600);
 }
 
-/// A limit on the length of files (`ulimit -f`) is reported as a full disk is, and what was there stays.
+/// A limit on file sizes (`ulimit -f`) is reported like a full disk, and existing files are kept.
 #[test]
 fn a_file_that_grows_beyond_the_limit_is_an_error_to_report() {
     let folder = Folder::new();
@@ -424,7 +423,7 @@ fn a_file_that_grows_beyond_the_limit_is_an_error_to_report() {
     }
 }
 
-/// Help and version are results, too.
+/// Help and version are also results.
 #[test]
 fn help_that_finds_no_room_is_an_error() {
     let Ok(_) = fs::OpenOptions::new().write(true).open("/dev/full") else {
@@ -447,7 +446,7 @@ fn help_that_finds_no_room_is_an_error() {
         let good = to("/dev/null");
         assert!(good.status.success() && good.stderr.is_empty(), "{words:?}: {good:?}");
     }
-    // Whoever has read enough is no error.
+    // A reader that closes the pipe early is not an error.
     let script = format!("'{BINARY}' --help | head -1; echo \"${{PIPESTATUS[0]}}\"");
     let output = Command::new("bash").args(["-c", &script]).output().unwrap();
     assert!(String::from_utf8_lossy(&output.stdout).ends_with("\n0\n") && output.stderr.is_empty(), "{output:?}");
@@ -467,7 +466,7 @@ fn pipes_of_a_shell_work() {
         let output = Command::new("bash").args(["-ec", &script]).current_dir(folder.path("")).output().unwrap();
         assert!(output.status.success(), "{script}: {output:?}");
     }
-    // Beside it a spec without records says what it is.
+    // A spec without records is reported as such.
     let output = Command::new("bash")
         .args(["-c", &format!("'{BINARY}' check <(echo 'no = \"spec\"')")])
         .current_dir(folder.path(""))

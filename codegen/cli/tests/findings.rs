@@ -1,4 +1,4 @@
-//! The page of every finding: its example, run as a user would, gives the finding, and with the fix it is gone.
+//! The page of every finding: its example gives the finding, and the fix removes it.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -32,7 +32,7 @@ fn blocks(text: &str) -> Vec<Block<'_>> {
     found
 }
 
-/// A line of a spec without its remark.
+/// A line of a spec without its comment.
 fn bare(line: &str) -> &str {
     line.split_once(" #").map_or(line, |(before, _)| before).trim_end()
 }
@@ -42,9 +42,9 @@ fn signed<'a>(lines: &[&'a str], signs: &str) -> Vec<&'a str> {
     lines.iter().filter(|line| line.starts_with(|sign| signs.contains(sign))).map(|line| &line[1..]).collect()
 }
 
-/// `text` after a change: the lines with `-` and those without a sign, one after the other behind the line that stands
-/// between `@@`, give way to the lines with `+` and those without a sign. Where there are only lines with `+`, they stand
-/// behind that line, or else at the end. `fix`: lines in place of the last lines with `+`.
+/// Applies a change to `text`: lines with `-` and lines without a sign, after the line given in `@@`, are replaced by lines with `+`
+/// and those without a sign. Lines with only `+` are inserted after that line, or at the end. `fix`: lines that replace the last
+/// lines with `+`.
 fn changed(text: &str, change: &[&str], fix: Option<&[&str]>) -> String {
     let mut lines: Vec<&str> = text.lines().collect();
     let mut hunks: Vec<(&str, &[&str])> = Vec::new();
@@ -87,11 +87,10 @@ fn changed(text: &str, change: &[&str], fix: Option<&[&str]>) -> String {
 /// Codes of what was found, and the exit code.
 type Outcome = (Vec<String>, i32);
 
-/// What came of commands in the repository's own files: most fixes are these files as they are.
+/// Results of commands on the repository's own files: most fixes give these files.
 type Known = Mutex<BTreeMap<String, Outcome>>;
 
-/// Runs the example of a page, with the lines and commands of its fix in place of its own if `is_fixed`, and says what came
-/// of it; none, if they are not such as can be run here.
+/// Runs the example of a page, with the fix applied if `is_fixed`, and returns the outcome; none if it cannot be run here.
 fn outcome(page: &str, is_fixed: bool, known: &Known) -> Option<Outcome> {
     let (example, fix) = page.split_once("\n## Example\n").unwrap().1.split_once("\n## Fix\n").unwrap();
     let (example, fix) = (blocks(example), blocks(fix));
@@ -112,7 +111,7 @@ fn outcome(page: &str, is_fixed: bool, known: &Known) -> Option<Outcome> {
     let (new_commands, new_lines): (Vec<&Block>, Vec<&Block>) = fix.iter().partition(|block| block.language == "sh");
     let checked = files.iter().map(|block| block.file).find(|file| file.ends_with(".toml"));
     if is_fixed && fix.is_empty() {
-        // The file as it was.
+        // The unchanged file.
         files.pop();
     }
     let mut is_changed = false;
@@ -148,7 +147,7 @@ fn outcome(page: &str, is_fixed: bool, known: &Known) -> Option<Outcome> {
     Some(outcome)
 }
 
-/// What is wrong with the example of a code, if anything; whether it was run.
+/// Checks the example of a code. Returns whether it was run, or the error.
 fn judged(code: Code, page: &str, known: &Known) -> Result<bool, String> {
     let Some((found, exit)) = outcome(page, false, known) else { return Ok(false) };
     if !found.iter().any(|one| one == code.id) {
@@ -167,7 +166,7 @@ fn judged(code: Code, page: &str, known: &Known) -> Result<bool, String> {
 #[test]
 fn every_example_gives_its_finding_and_every_fix_removes_it() {
     let (next, known) = (AtomicUsize::new(0), Known::default());
-    // Every tenth in the short run.
+    // In the short run, every tenth.
     let codes: Vec<Code> = specgen::findings::all().into_iter().step_by(crate::support::length(10, 1)).collect();
     let judge = || {
         let next = || codes.get(next.fetch_add(1, Ordering::Relaxed));
@@ -186,7 +185,7 @@ fn every_example_gives_its_finding_and_every_fix_removes_it() {
     assert!(100 * not_run <= 15 * judged.len(), "{not_run} examples are not run");
 }
 
-/// The judge sees what it is there for.
+/// The check detects errors.
 #[test]
 fn an_example_that_shows_nothing_and_a_fix_that_does_not_help_are_seen() {
     let known = Known::default();

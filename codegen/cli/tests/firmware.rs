@@ -1,4 +1,4 @@
-//! `build`, `size` and `flash` as a user meets them, with a stand-in for probe-rs that says what it was asked.
+//! `build`, `size` and `flash` as a user runs them, with a fake probe-rs that logs its arguments.
 //!
 //! Needs a cross compiler; without one it skips.
 
@@ -67,7 +67,7 @@ fn an_image_is_built_checked_weighed_and_only_flashed_if_it_passes() {
     let sum: u64 = owners.iter().map(|o| o["code"].as_u64().unwrap() + o["constants"].as_u64().unwrap()).sum();
     assert_eq!(sum, flash);
 
-    // The image says where it comes from, and the numbers are the same.
+    // The image contains its origin, and the numbers are the same.
     let image = "out/target/qemu.elf";
     let size = folder.run(&["size", image]);
     assert_eq!(size.code, 0, "{size:#?}");
@@ -79,7 +79,7 @@ fn an_image_is_built_checked_weighed_and_only_flashed_if_it_passes() {
     assert_eq!(weighed["result"]["size"], made["size"]);
     assert_eq!(weighed["result"]["checks"], made["checks"]);
 
-    // Over budget: who takes most, and by how much to shrink; nothing is flashed.
+    // Over budget: the largest parts, and by how much to shrink; nothing is flashed.
     folder.spec("tight.toml", &[("flash        = \"128 KiB\"", &format!("flash = \"{} B\"", flash - 10))]);
     let tight = ["build", "tight.toml", "--target", "qemu", "-o", "tight", "--no-measure", "--target-dir", &dir];
     folder.run(&tight).says(1, &["target.budget.flash allows", "reduce it by 10", "largest: "]);
@@ -89,7 +89,7 @@ fn an_image_is_built_checked_weighed_and_only_flashed_if_it_passes() {
     flashing(&folder, image);
 }
 
-/// The image with another text in the place of one that it has once.
+/// Writes the image with one text replaced, which must occur once.
 fn edited(folder: &Folder, image: &str, name: &str, from: &[u8], to: &[u8]) {
     let mut bytes = fs::read(folder.path(image)).unwrap();
     let places: Vec<usize> = bytes.windows(from.len()).enumerate().filter(|at| at.1 == from).map(|at| at.0).collect();
@@ -98,7 +98,7 @@ fn edited(folder: &Folder, image: &str, name: &str, from: &[u8], to: &[u8]) {
     folder.write(name, bytes);
 }
 
-/// The emulated machine's image stands in for a board's, under a board's name: to probe-rs it is a file.
+/// The image of the emulated machine, under the name of a board: to probe-rs it is a file.
 fn flashing(folder: &Folder, emulated: &str) {
     let image = "board.elf";
     let own = b"specgen-board: qemu     \n";
@@ -110,19 +110,19 @@ fn flashing(folder: &Folder, emulated: &str) {
     let unasked = ["--yes"];
     let board = ["--yes", "--assumed-ok"];
     let commands = [format!("download --chip STM32H743ZITx --verify {image}"), "reset --chip STM32H743ZITx".to_owned()];
-    // Nothing to flash with: what is missing, and the exact commands.
+    // Without probe-rs: what is missing, and the exact commands.
     let bare = without_probe_rs();
     let missing = flash(&bare, &board);
     missing.says(3, &["probe-rs is not installed", "cargo install probe-rs-tools", &commands[0], &commands[1]]);
 
     let path = fake_probe_rs(folder, 0);
     let asked = || fs::read_to_string(folder.path("asked.txt")).unwrap_or_default();
-    // Nobody says that the amplifiers are off.
+    // Without confirmation that the amplifiers are off.
     flash(&path, &["--assumed-ok"]).says(2, &["switch the amplifiers off", "--yes"]);
-    // The image knows what its spec assumed, and that its record was simulated.
+    // The image contains the assumed values of its spec, and that its record is simulated.
     let known = ["E0348", "geometry.base_radius, ", "records/reference-forc.csv (simulated)", "nothing was flashed"];
     flash(&path, &unasked).says(1, &known);
-    // Its board is the one that it names, whatever an argument says; the emulated machine is none.
+    // The image determines its board, not an argument; the emulated machine is not a board.
     let other =
         ["nothing was flashed: board.elf is for stm32h743, not for stm32f4", "specgen build SPEC --target stm32f4"];
     flash(&path, &[&board[..], &["--target", "stm32f4"]].concat()).says(2, &other);
@@ -156,7 +156,7 @@ fn flashing(folder: &Folder, emulated: &str) {
     ];
     assert!(asked().ends_with(&format!("{}\n", both.join("\n"))), "{}", asked());
     flash(&path, &[&board[..], &["--speed", "0"]].concat()).says(2, &["--speed"]);
-    // It fails half-way: said, with what to run again.
+    // It fails half-way, with the command to run again.
     let failing = fake_probe_rs(folder, 5);
     flash(&failing, &board).says(3, &["probe-rs failed", "keep the amplifiers", &commands[0]]);
 }
@@ -180,7 +180,7 @@ fn what_does_not_fit_together_is_refused_before_anything_is_built() {
     let document =
         Document::of(&Run::of(folder.command().args(["build", "legs.toml", "--target", "stm32f4", "--json"])));
     assert!(document.finding("E0333")["line"].as_u64().unwrap() > 1);
-    // What begins as an image and is none.
+    // A file that only starts like an image.
     folder.write("broken.elf", b"\x7fELF and no more");
     folder.run(&["size", "broken.elf"]).says(3, &["cannot be analysed"]);
     fs::remove_file(folder.path("broken.elf")).unwrap();

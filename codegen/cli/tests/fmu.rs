@@ -1,5 +1,5 @@
-//! `specgen export fmu` as a user runs it: every output word of the controller's unit is that of the same controller under Rust, and
-//! those of the plant's are what `specgen sim` has.
+//! `specgen export fmu` as a user runs it: outputs of the controller's unit equal those of the controller in Rust, and outputs of the
+//! plant's unit equal those of `specgen sim`.
 
 use std::fs;
 use std::process::{Command, Stdio};
@@ -12,7 +12,7 @@ use rawzip::ZipArchive;
 
 const TICKS: u32 = 10_000;
 
-/// Extracts a unit into the folder `unit`: what is in it is stored, not compressed.
+/// Extracts a unit, which is not compressed, into the folder `unit`.
 fn extract(folder: &Folder, file: &str) {
     let bytes = fs::read(folder.path(file)).unwrap();
     let archive = ZipArchive::from_slice(&bytes).unwrap();
@@ -28,7 +28,7 @@ fn extract(folder: &Folder, file: &str) {
 /// Settings of a plant.
 const SETTINGS: usize = 5;
 
-/// What an output depends on at once: nothing while the unit in `unit/` runs, and before its first step what `at_first` names.
+/// Asserts that no output of the unit in `unit/` depends directly on an input, except those in `at_first` before the first step.
 fn is_no_loop(folder: &Folder, at_first: &str) {
     let text = folder.read("unit/modelDescription.xml");
     for (part, on) in [("Outputs", ""), ("InitialUnknowns", at_first)] {
@@ -38,7 +38,7 @@ fn is_no_loop(folder: &Folder, at_first: &str) {
     }
 }
 
-/// Inputs that arm the machine, run it and move its set-points.
+/// Inputs that arm and run the machine, and move its set-points.
 fn inputs(machine: &Supervised) -> Vec<Vec<u64>> {
     let scalar = machine.controller().description().scalar;
     let names = machine.input_names();
@@ -110,7 +110,7 @@ fn an_importer_gets_the_bits_of_the_controller() {
         let found = run(&format!("unit/binaries/linux64/{name}.so"));
         let wanted = bytes(expected.iter().copied());
         assert!(found == wanted, "{name}: words differ");
-        // The comparison can fail, and the machine left its first phase.
+        // The comparison is able to fail, and the machine has left its first phase.
         let supervisor = expected.chunks(row.len()).map(|row| row[row.len() - 2]);
         assert!(supervisor.collect::<std::collections::BTreeSet<u64>>().len() > 2);
         assert_ne!(found[found.len() / 2..], vec![0; found.len() - found.len() / 2]);
@@ -123,10 +123,10 @@ fn an_importer_gets_the_bits_of_the_controller() {
     }
 }
 
-/// Phase in which the law works.
+/// Phase in which the law runs.
 const RUNNING: u64 = 2;
 
-/// What `specgen sim --record` wrote, run again: input and output words of every tick.
+/// Replays a recording of `specgen sim --record`: input and output words of every tick.
 fn recorded(folder: &Folder, record: &str, machine: &mut Supervised) -> [Vec<Vec<u64>>; 2] {
     let mut reader = Reader::new(fs::File::open(folder.path(record)).unwrap()).unwrap();
     let [mut inputs, mut outputs] = [Vec::new(), Vec::new()];
@@ -139,14 +139,14 @@ fn recorded(folder: &Folder, record: &str, machine: &mut Supervised) -> [Vec<Vec
     [inputs, outputs]
 }
 
-/// Places of the names that begin with these stems, in their order.
+/// Indices of the names with these stems, in the order of the stems.
 fn places(names: &[String], stems: &[&str]) -> Vec<usize> {
     let of =
         |stem: &&str| (0..6).map(|k| names.iter().position(|name| *name == format!("{stem}[{k}]")).unwrap()).collect();
     stems.iter().flat_map(|stem: &&str| -> Vec<usize> { of(stem) }).collect()
 }
 
-/// Words that differ.
+/// Number of words that differ.
 fn differing<'a>(found: impl Iterator<Item = &'a u64>, wanted: impl Iterator<Item = &'a u64>) -> usize {
     found.zip(wanted).filter(|(a, b)| a != b).count()
 }
@@ -175,11 +175,11 @@ fn a_controller_on_the_unit_of_its_plant_gets_the_bits_of_specgen_sim() {
         let (inputs, outputs) = (machine.input_names(), machine.output_names());
         let [given, answers] = recorded(&folder, "run.rec", &mut machine);
 
-        // The plant by itself, on the voltages of the record, must read what the record has a tick later.
+        // The plant alone, with the voltages of the record, must read the gauges of the next tick.
         let readings: &[&str] = if name == "legs" { &["displacement"] } else { &["gauge", "wrench"] };
         let (voltages, read) = (places(&outputs, &["voltage"]), places(&inputs, readings));
         let pick = |row: &[u64], places: &[usize]| places.iter().map(|place| row[*place]).collect::<Vec<_>>();
-        // It arms before the plant moves. The first tick of the law has the first readings once more.
+        // It arms before the plant moves. The first tick of the law repeats the first readings.
         let start = 1 + answers.iter().position(|row| row[row.len() - 2] & 0xff == RUNNING).unwrap();
         let moved = start + 1;
         assert_eq!(pick(&given[start], &read), pick(&given[0], &read));
@@ -210,7 +210,7 @@ fn a_controller_on_the_unit_of_its_plant_gets_the_bits_of_specgen_sim() {
             found.iter().zip(wanted).map(|(row, wanted)| differing(row.iter(), wanted.iter())).sum::<usize>()
         };
         assert_eq!(compare(&wanted), 0, "{name}: words differ");
-        // One ulp of one reading is found, and a bit of a voltage that its noise does not round away moves the machine.
+        // A change of one ulp in a reading is detected, and a change of a voltage larger than its rounding moves the machine.
         wanted[TICKS as usize / 2][1] ^= 1;
         assert_eq!(compare(&wanted), 1, "{name}");
         let faulty = driven(&library, fed(Some(TICKS as usize / 2)));
@@ -225,7 +225,7 @@ fn a_controller_on_the_unit_of_its_plant_gets_the_bits_of_specgen_sim() {
     }
 }
 
-/// Both units under fmpy, which validates them: the closed loop, against the record.
+/// Both units in fmpy, which validates them: the closed loop equals the record.
 fn with_fmpy(folder: &Folder, name: &str, given: &[Vec<u64>], answers: &[Vec<u64>], setpoint: usize, first: usize) {
     let python = std::env::var("SPECGEN_PYTHON").unwrap_or_else(|_| "python3".to_owned());
     let has = Command::new(&python).args(["-c", "import fmpy"]).stderr(Stdio::null()).status();

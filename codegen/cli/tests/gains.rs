@@ -1,19 +1,19 @@
-//! `specgen identify gains` as a user runs it, on a simulated machine whose legs are of other classes than the controller's model:
-//! the gains of its legs, and what the platform's error is with the tables that come of them.
+//! `specgen identify gains` as a user runs it, on a simulated machine with legs outside the controller's model class: the gains of its
+//! legs, and the platform's error with the resulting tables.
 //! `SPECGEN_FULL=1 cargo test --release -p specgen --test all gains -- --include-ignored --nocapture` prints the figures.
 
 use crate::support::{Folder, length};
 
 const RECORDS: &str = "records = [\"records/reference-forc.csv\"]  # one for all six legs, or six";
 
-/// Stroke and workspace that a table of less gain reaches.
+/// Stroke and workspace for a table with less gain.
 const LESS: [(&str, &str); 3] = [
     ("\"60 um\"", "\"53.4 um\""),
     ("[\"50 um\", \"50 um\", \"52 um\"]", "[\"43 um\", \"43 um\", \"50.5 um\"]"),
     ("[\"0.4 mrad\", \"0.35 mrad\", \"0.5 mrad\"]", "[\"0.34 mrad\", \"0.3 mrad\", \"0.43 mrad\"]"),
 ];
 
-/// `reference.toml` at 10 Hz with the line of its records replaced, and of less stroke where the table has less gain, as `name`.
+/// Writes `name`: `reference.toml` at 10 Hz with other records, and with less stroke if `less`.
 fn spec(folder: &Folder, name: &str, records: &str, less: bool) {
     let mut text = folder.read("reference.toml");
     for (old, new) in LESS.iter().filter(|_| less).chain(&[(RECORDS, records)]) {
@@ -82,7 +82,7 @@ fn a_run_of_the_machine_gives_the_gain_of_each_leg_and_tables_that_take_its_erro
         }
     }
 
-    // What is no such run is refused, and how to make one is said.
+    // An unsuitable run is refused, with a way to make a suitable one.
     folder.run(&["sim", "off.toml", "--record", "short.rec", "--seconds", "0.01"]).says(0, &[]);
     folder
         .run(&["identify", "gains", "short.rec", "--spec", "off.toml"])

@@ -1,4 +1,4 @@
-//! The tutorials walked as a reader would: their commands in order, in one folder, their output in the form that they show.
+//! Follows the tutorials: runs their commands in order, in one folder, and compares the form of the output.
 
 use std::fs;
 use std::time::Instant;
@@ -6,7 +6,7 @@ use std::time::Instant;
 use crate::support::commands::{blocks, is_marked, shell};
 use crate::support::repository;
 
-/// A line with each number as `#`: what a run says, whatever it measured. Columns may move.
+/// A line with each number replaced by `#`. Columns may move.
 fn form(line: &str) -> String {
     let mut out = String::new();
     for word in line.split_whitespace() {
@@ -25,14 +25,14 @@ fn form(line: &str) -> String {
     out
 }
 
-/// Lines that are shown and that no line of the output has the form of.
+/// Shown lines whose form no line of the output has.
 fn missing(shown: &str, output: &str) -> Vec<String> {
     let forms: Vec<String> = output.lines().map(form).collect();
     let is_there = |line: &&str| line.trim() == "…" || forms.contains(&form(line));
     shown.lines().filter(|line| !is_there(line)).map(str::to_owned).collect()
 }
 
-/// In the order in which they are read.
+/// The tutorials, in reading order.
 const TUTORIALS: [&str; 3] = ["first-controller.md", "your-platform.md", "guide.md"];
 
 #[test]
@@ -59,10 +59,10 @@ fn the_tutorials_can_be_walked() {
                     println!("{:5.1} s  {place}", start.elapsed().as_secs_f64());
                     assert_eq!(run.code, 0, "{place}\n{script}{}\n{}", run.stdout, run.stderr);
                     here = fs::read_to_string(folder).unwrap().trim().into();
-                    // Nothing to compare with where everything is marked.
+                    // Nothing to compare if all commands are only parsed.
                     output = script.contains("specgen ").then_some(run.stdout);
                 }
-                // What is shown right below commands came from them.
+                // A block directly after commands is their output.
                 ("text", Some(printed)) => {
                     let missing = missing(&block.body, &printed);
                     assert!(missing.is_empty(), "{place} shows {missing:#?}, the command printed:\n{printed}");
@@ -76,13 +76,13 @@ fn the_tutorials_can_be_walked() {
     assert!(here.ends_with("bench") && here.join("run.csv").is_file() && here.join("report.html").is_file());
 }
 
-/// docs/porting.md: what is generated, and the drivers of the example beside it. Its programs are built by `tests/tests/porting.rs`.
+/// docs/porting.md: the generated workspace, with the drivers of the example. `tests/tests/porting.rs` builds its programs.
 #[test]
 #[ignore = "long: packages of a board built and tested"]
 fn the_page_about_porting_can_be_walked() {
     let folder = tempfile::tempdir().unwrap();
     let text = fs::read_to_string(repository().join("docs/porting.md")).unwrap();
-    // Of packages that others wrote nothing changes from run to run.
+    // Third-party packages do not change between runs.
     let (root, target) = (repository(), repository().join("target/tests/own-board"));
     let script: String = blocks(&text)
         .iter()
@@ -98,7 +98,7 @@ fn the_page_about_porting_can_be_walked() {
     assert!(run.stdout.contains("test result: ok. 6 passed"), "{}", run.stdout);
 }
 
-/// The judge sees another form, and no more than that.
+/// The check detects another form, and only that.
 #[test]
 fn a_line_that_is_not_said_is_seen() {
     let said = "error, nm rms  23.98 |  23.74\ngate: passed\n";

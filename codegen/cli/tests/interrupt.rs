@@ -1,4 +1,4 @@
-//! What is left when a command is interrupted, and when standard output or standard error takes nothing more.
+//! Interrupted commands, and standard output or standard error that cannot be written.
 
 #![cfg(unix)]
 
@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 use crate::support::{Folder, Run};
 use rustix::process::{Pid, Signal, kill_process_group};
 
-/// A folder with a `cargo` that never ends, and a folder for what is temporary.
+/// A folder with a `cargo` that never ends, and a folder for temporary files.
 fn with_slow_cargo() -> Folder {
     let folder = Folder::new();
     fs::create_dir_all(folder.path("bin")).unwrap();
@@ -26,12 +26,12 @@ fn with_slow_cargo() -> Folder {
 fn slow(folder: &Folder, arguments: &[&str]) -> Command {
     let mut command = folder.command();
     command.args(arguments).env("PATH", format!("{}:/usr/bin:/bin", folder.path("bin").display()));
-    // What was built earlier would need no cargo.
+    // A cached build would need no cargo.
     command.env("TMPDIR", folder.path("tmp")).env("SPECGEN_CACHE", "");
     command
 }
 
-/// Interrupted, with all that it has started, as soon as it waits for cargo; `reproduce`, which needs none, once it has a folder of its own.
+/// Interrupts a command and its children as soon as it waits for cargo; `reproduce`, which needs none, once it has its own folder.
 fn interrupted(folder: &Folder, arguments: &[&str], signal: Signal) -> Run {
     let _ = fs::remove_file(folder.path("begun"));
     let mut command = slow(folder, arguments);
@@ -59,7 +59,7 @@ fn an_interrupt_leaves_nothing_half_done() {
         (&["replay", "legs.toml", "--csv", "rows.csv"], "rows.csv"),
     ] {
         if arguments[0] == "replay" {
-            // No record, so no cargo: what a refusal leaves.
+            // A missing record, so a refusal before cargo.
             assert_eq!(folder.run(arguments).code, 1);
         } else {
             let run = interrupted(&folder, arguments, Signal::INT);
@@ -69,14 +69,14 @@ fn an_interrupt_leaves_nothing_half_done() {
         assert!(!folder.path(left).exists(), "{arguments:?} leaves {left}");
         assert!(is_empty(&folder, "tmp"), "{arguments:?}");
     }
-    // Whole before the build began: the next run takes it up.
+    // Complete before the build started, so the next run can use it.
     let run = interrupted(&folder, &["legs.toml", "-o", "out"], Signal::INT);
     assert_eq!(run.code, 130, "{run:?}");
     assert!(is_empty(&folder, "tmp"));
     assert_eq!(folder.run(&["legs.toml", "-o", "out", "--no-build"]).code, 0);
 }
 
-/// A run that builds has the folder: another one says whose it is, and takes it once that is killed.
+/// A building run locks the folder: another run names its owner, and gets the lock once that is killed.
 #[test]
 fn a_folder_in_use_names_the_run_that_has_it() {
     let folder = with_slow_cargo();
@@ -110,7 +110,7 @@ fn an_end_from_outside_is_reported_to_programs() {
     }
 }
 
-/// The device that takes nothing.
+/// A device that is always full.
 fn full() -> Option<File> {
     let full = fs::OpenOptions::new().write(true).open("/dev/full").ok();
     if full.is_none() {
@@ -129,13 +129,13 @@ fn output_that_is_not_whole_is_an_error() {
         assert_eq!(output.status.code(), Some(3), "{arguments:?}: {said}");
         assert!(said.contains("error: could not write to standard output: "), "{arguments:?}: {said}");
     }
-    // Whoever has read enough, as `head` does, is no error.
+    // A reader that closes the pipe early, such as `head`, is not an error.
     let script = format!("'{}' dump-ir legs.toml | head -1; echo \"${{PIPESTATUS[0]}}\"", support::BINARY);
     let output = Command::new("bash").args(["-c", &script]).current_dir(folder.path("")).output().unwrap();
     assert!(String::from_utf8(output.stdout).unwrap().ends_with("\n0\n"));
 }
 
-/// The exit code is the same whether the message can be read or not.
+/// The exit code does not depend on whether the message can be written.
 #[test]
 fn messages_that_nobody_can_read_change_nothing() {
     let folder = Folder::new();
@@ -146,7 +146,7 @@ fn messages_that_nobody_can_read_change_nothing() {
     }
 }
 
-/// A pipe takes what comes; it is not replaced by a file. Nor is a folder filled by half.
+/// Output goes into a pipe, which is not replaced by a file. Nor is a folder left incomplete.
 #[test]
 fn a_pipe_stays_a_pipe() {
     let folder = Folder::new();

@@ -1,4 +1,4 @@
-//! `kill -9` at any time: every next run succeeds, what was written is whole, and nothing of the user's is lost.
+//! `kill -9` at any time: the next run succeeds, written files are complete, and no user data is lost.
 
 #![cfg(unix)]
 
@@ -15,7 +15,7 @@ use rustix::process::{Pid, Signal, kill_process_group};
 
 use crate::support::{Folder, Run, contents, length};
 
-/// A number from 0 to 1.
+/// A random number from 0 to 1.
 fn part(random: &mut ChaCha8Rng) -> f64 {
     f64::from(random.next_u32()) / f64::from(u32::MAX)
 }
@@ -24,7 +24,7 @@ fn start(command: &mut Command) -> Child {
     command.stdout(Stdio::null()).stderr(Stdio::null()).process_group(0).spawn().unwrap()
 }
 
-/// Kills it with all that it has started; whether it had not ended by itself.
+/// Kills a process and its children. Returns whether it was still running.
 fn kill(mut child: Child) -> bool {
     kill_process_group(Pid::from_raw(child.id().cast_signed()).unwrap(), Signal::KILL).ok();
     child.wait().unwrap().signal() == Some(9)
@@ -33,26 +33,26 @@ fn kill(mut child: Child) -> bool {
 /// One way to write the output.
 #[derive(Clone, Copy, PartialEq, Debug)]
 enum Way {
-    /// From beside it: the folders change places.
+    /// From outside the folder: folders are swapped.
     Swap,
-    /// From a shell that stands in it: files are replaced one by one.
+    /// From a shell inside the folder: files are replaced one by one.
     InPlace,
 }
 
-/// An output that is written by one spec and by another in turn, with what belongs to the user around it.
+/// An output folder that two specs write alternately, with user files in and around it.
 struct Output {
     folder: Folder,
-    /// What each spec makes.
+    /// Output of each spec.
     whole: [BTreeMap<String, Vec<u8>>; 2],
 }
 
 const SPECS: [&str; 2] = ["legs.toml", "other.toml"];
-/// What the user has: in the output what cargo made, beside it work.
+/// User data: cargo's files in the output, other files beside it.
 const OF_USER: [&str; 4] = ["out/target/release/object.o", "out/Cargo.lock", "out/controller/target/kept", "notes.txt"];
 
 impl Output {
     fn new() -> Self {
-        // Where files are written slowly enough to be killed in between.
+        // On a disk, where writing is slow enough to be interrupted.
         let folder = Folder::on_disk();
         folder.spec("other.toml", &[("= \"pcc\"", "= \"ewma\""), ("name = \"legs\"", "name = \"other\"")]);
         let whole = SPECS.map(|spec| {
@@ -79,7 +79,7 @@ impl Output {
         command
     }
 
-    /// What specgen wrote of what is in the output.
+    /// Files of specgen in the output.
     fn written(&self) -> BTreeMap<String, Vec<u8>> {
         let mut files = contents(&self.folder.path("out"));
         files.retain(|path, _| !OF_USER.contains(&format!("out/{path}").as_str()));
@@ -90,7 +90,7 @@ impl Output {
         self.folder.path(".out.specgen")
     }
 
-    /// The next run of `spec` succeeds and leaves what it should.
+    /// Asserts that the next run of `spec` succeeds, with the correct output.
     fn recovers(&self, spec: usize, what: &str) {
         let run = Run::of(&mut self.command(SPECS[spec], Way::Swap));
         assert_eq!(run.code, 0, "{what}: {}", run.stderr);
@@ -102,7 +102,7 @@ impl Output {
     }
 }
 
-/// Kills as soon as files are staged, or some moments later: returns how many came in the midst of it.
+/// Kills as soon as files are staged, or slightly later. Returns how many kills came during the write.
 fn aimed(way: Way, rounds: usize, random: &mut ChaCha8Rng) -> usize {
     let output = Output::new();
     let mut hits = 0;
@@ -137,7 +137,7 @@ fn a_kill_while_a_folder_is_written_leaves_the_old_one_or_the_new_one() {
     }
 }
 
-/// The commands of which each was killed at random times of its run.
+/// Kills each of these commands at random times.
 #[test]
 #[ignore = "long: 200 kills at random times"]
 fn every_run_after_a_kill_succeeds() {
@@ -152,7 +152,7 @@ fn every_run_after_a_kill_succeeds() {
         &["report", "legs.toml", "--generations", "0", "--no-target", "-o", "page.html"],
     ];
     for arguments in commands {
-        // Once whole: how long it takes, with the controller built and kept.
+        // A complete run first, to measure its time with a cached build.
         let run = |what: &str| {
             folder.write("legs.toml", &spec);
             let begun = Instant::now();
@@ -169,7 +169,7 @@ fn every_run_after_a_kill_succeeds() {
             let child = start(folder.command().args(arguments));
             std::thread::sleep(took.mul_f64(1.05 * part(&mut random)));
             killed += usize::from(kill(child));
-            // Whole, old or new: the spec compiles, the record replays, the page ends.
+            // The old or the new file is complete: the spec compiles, the record replays, the page ends properly.
             assert_eq!(folder.run(&["check", "legs.toml"]).code, 0, "{what}");
             if arguments[0] == "sim" {
                 folder.write("legs.toml", &spec);

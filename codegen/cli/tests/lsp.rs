@@ -1,4 +1,4 @@
-//! `specgen lsp` with an editor's own client (Neovim, where it is installed) and by messages written out.
+//! `specgen lsp` with a real editor (Neovim, if installed) and with hand-written messages.
 
 use std::io::{BufRead, BufReader, Read, Write};
 use std::process::{Command, Stdio};
@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 
 use crate::support::{BINARY, Folder, Run, skipped};
 
-/// The messages of a session, as the server answers them: each a request or a notification.
+/// Runs a session of requests and notifications, and returns the server's messages.
 fn session(folder: &Folder, messages: &[Value]) -> Vec<Value> {
     let mut server = folder
         .command()
@@ -127,11 +127,11 @@ fn keys_units_choices_and_files_are_offered_and_explained() {
     assert_eq!(labels(2), ["m", "mm", "um", "nm"]);
     assert_eq!(labels(3), ["invhys", "ewma", "pcc"]);
     assert!(labels(4).contains(&"records/reference-forc.csv".to_owned()), "{:?}", labels(4));
-    // What is there is not offered again.
+    // Existing keys are not offered again.
     assert_eq!(labels(5), ["capacitance"]);
 }
 
-/// What a user of Neovim has after opening a spec with a slip, asking for its meaning and taking the fix.
+/// Neovim opens a spec with an error, shows the hover text and applies the fix.
 const SCRIPT: &str = r#"
 local out = io.open("out.txt", "w")
 local client = vim.lsp.start_client({ name = "specgen", cmd = { os.getenv("SPECGEN"), "lsp" }, root_dir = vim.fn.getcwd() })
@@ -173,7 +173,7 @@ fn neovim_shows_a_slip_and_applies_its_fix() {
     let run = Run::of(&mut nvim);
     let out = folder.read("out.txt");
     let line = good.lines().position(|line| line.starts_with("height")).unwrap() + 1;
-    let expected = format!("1 E0202 line {line}\nReplace by height\n0 left\n`geometry.height`, P_z in the paper\n");
+    let expected = format!("1 E0202 line {line}\nReplace with height\n0 left\n`geometry.height`, P_z in the paper\n");
     assert_eq!(out, expected, "{}", run.stderr);
     assert_eq!(folder.read("open.toml"), good);
 }

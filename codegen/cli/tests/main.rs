@@ -1,4 +1,4 @@
-//! The command and the compiler as a user meets them, in one binary: a module for each subject.
+//! Tests of the command and the compiler from a user's view, in one binary: a module for each subject.
 #![allow(clippy::unwrap_used, clippy::panic)] // Helpers of tests, where a panic is a failed test.
 
 mod assumed;

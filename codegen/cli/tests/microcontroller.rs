@@ -1,4 +1,4 @@
-//! From a workspace to measured figures, on a stand-in controller: build, replay, footprint, stack bound.
+//! From a workspace to measured figures, on a dummy controller: build, replay, footprint, stack bound.
 //!
 //! Needs a cross compiler and QEMU; without them it skips.
 
@@ -75,7 +75,7 @@ fn instructions_are_counted_exactly() {
         assert_eq!((step.calls, step.smallest), (40, step.largest), "nothing in it depends on the data");
         assert_eq!(step.sum, 40 * step.smallest);
         let other = result.stats.stage("setpoint").unwrap();
-        // Parts are measured on some of the ticks.
+        // Parts are measured only in some ticks.
         assert!((1..=40).contains(&other.calls) && other.smallest == other.largest, "{other:?}");
         assert!((8..30).contains(&other.smallest), "6 additions, loads and stores of several at once: {other:?}");
         step.smallest
@@ -206,7 +206,7 @@ fn requests_that_do_not_fit_are_explained() {
         if input.setpoint[0] == 43.0 { for i in 0..400_000 { core::hint::black_box(i); } }
         0.0
     }";
-    // In the short run the image of other tests.
+    // In the short run, use the image of other tests.
     let extra = length("-0.0", extra);
     let image = build(&Workspace::new(&tools, "", extra), Mcu::Mps2An500);
     let refused = |config: &[u64], rows: &[Vec<u64>]| replay(&image, config, rows, LIMIT).unwrap_err().to_string();

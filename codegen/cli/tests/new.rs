@@ -1,4 +1,4 @@
-//! `specgen new` as its first users meet it: from their data sheet to a spec that passes `check`, in one round.
+//! `specgen new` for a new user: from a data sheet to a spec that passes `check`, at the first attempt.
 
 use std::fs;
 
@@ -7,7 +7,7 @@ use rand_chacha::rand_core::{Rng, SeedableRng};
 
 use crate::support::{Folder, Run, length, repository};
 
-/// Platforms of the kind that are built: strokes, sizes, masses and rates over the ranges of catalogues, each physically whole.
+/// Realistic platforms: strokes, sizes, masses and rates over the ranges of catalogues, physically consistent.
 fn plausible(rng: &mut ChaCha8Rng) -> Vec<String> {
     let mut within = |low: f64, high: f64| {
         let share = rng.next_u64() as f64 / u64::MAX as f64;
@@ -39,7 +39,7 @@ fn plausible(rng: &mut ChaCha8Rng) -> Vec<String> {
 #[test]
 fn a_platform_from_its_data_sheet_passes_check_in_the_first_round() {
     let folder = Folder::new();
-    // An engineer's card: symbols of the paper, a rate in kHz, capacitive gauges.
+    // An engineer's values: symbols of the paper, a rate in kHz, capacitive gauges.
     let made = folder.line(
         "new mine --like reference --r_B '200 mm' --r_P '120 mm' --alpha_B '10 deg' --m '2.4 kg' --I \
          '0.012 kg m^2, 0.012 kg m^2, 0.02 kg m^2' --stroke '100 um' --voltage '-20 V, 120 V' --stiffness \
@@ -92,7 +92,7 @@ fn asked(folder: &Folder, name: &str, answers: &str) -> Run {
 #[test]
 fn questions_are_asked_again_until_the_answer_holds_and_blank_lines_take_what_is_offered() {
     let folder = Folder::new();
-    // Which gauges; then a radius without unit, one in the wrong one, a right one; the rest as offered.
+    // The kind of gauges; then a radius without unit, one in a wrong unit, a correct one; defaults for the rest.
     let answers = format!("platform\n200\n200 kg\n200 mm\n{}", "\n".repeat(40));
     let made = asked(&folder, "mine", &answers);
     assert_eq!(made.code, 0, "{}", made.stderr);
@@ -118,7 +118,7 @@ fn what_cannot_be_is_refused_by_its_option_and_nothing_of_the_users_is_touched()
     fs::write(folder.path("full/notes.txt"), "mine").unwrap();
     assert_eq!(folder.run(&["new", "full", "--like", "legs"]).code, 2);
     assert_eq!(folder.read("full/notes.txt"), "mine");
-    // Answers that only together make no sense are kept in the spec that is refused.
+    // Answers that are only inconsistent together are kept in the refused spec.
     let heavy = ["--mass", "900 kg", "--inertia", "1 kg m^2, 1 kg m^2, 1.2 kg m^2"];
     let together = folder.run(&[&["new", "heavy", "--like", "reference"], &heavy[..]].concat());
     together.says(1, &["E0459", "heavy is written"]);
@@ -132,7 +132,7 @@ fn a_record_of_a_leg_of_a_spec_has_its_stroke_its_voltages_and_its_noise() {
     let text = text
         .replace("[\"0 V\", \"100 V\"]", "[\"-20 V\", \"130 V\"]")
         .replace("[\"0 V\", \"150 V\"]", "[\"-20 V\", \"130 V\"]");
-    // The record that it names is not there yet.
+    // The record that it names does not exist yet.
     folder.write("own.toml", text.replace("records/reference-forc.csv", "own.csv"));
     let made = folder.run(&["forc", "own.toml", "-o", "own.csv"]);
     assert_eq!(made.code, 0, "{}", made.stderr);

@@ -1,4 +1,4 @@
-//! `specgen operate` as a user runs it, against a board on made-up converters behind a socket, in real time.
+//! `specgen operate` as a user runs it, with a board on simulated converters at a socket, in real time.
 
 #![allow(clippy::unwrap_used, clippy::panic)] // Helpers of tests, where a panic is a failed test.
 
@@ -17,17 +17,17 @@ use controller::supervised::Phase;
 use specgen_link::client::Port;
 
 /// A board at a socket.
-struct Served {
+struct SocketBoard {
     path: PathBuf,
-    /// Phase of the machine, for the test to look at.
+    /// Phase of the machine, for the test.
     phase: Arc<AtomicU32>,
-    /// The converters fail from now on.
+    /// Set to make the converters fail.
     fails: Arc<AtomicBool>,
     over: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,
 }
 
-impl Served {
+impl SocketBoard {
     fn new(folder: &Folder) -> Self {
         let path = folder.path("board.sock");
         let listener = UnixListener::bind(&path).unwrap();
@@ -51,7 +51,7 @@ impl Served {
     }
 }
 
-impl Drop for Served {
+impl Drop for SocketBoard {
     fn drop(&mut self) {
         self.over.store(true, Ordering::Relaxed);
         if let Some(thread) = self.thread.take() {
@@ -68,7 +68,7 @@ fn serve(listener: &UnixListener, phase: &AtomicU32, fails: &AtomicBool, over: &
     let mut stream: Option<UnixStream> = None;
     while !over.load(Ordering::Relaxed) {
         let due = (start.elapsed().as_secs_f64() * 1e4) as u64;
-        // A computer that is busy with other things does not make up for lost time.
+        // A busy computer does not catch up on lost time.
         let now = (due - ticks).min(100) as u32;
         ticks = due;
         line.parts(|parts| parts.fails = fails.load(Ordering::Relaxed));
@@ -102,7 +102,7 @@ const WAVE: &str = "ramp = 0.05\nseconds = 0.4\n\
 #[test]
 fn a_script_runs_a_wave_and_fetches_its_record() {
     let folder = Folder::new();
-    let board = Served::new(&folder);
+    let board = SocketBoard::new(&folder);
     folder.write("wave.toml", WAVE);
     folder.write("fast.toml", WAVE.replace("frequency = 5.0", "frequency = 4000.0"));
     folder.write(
@@ -124,7 +124,7 @@ fn a_script_runs_a_wave_and_fetches_its_record() {
     let csv = folder.read("run.csv");
     assert!(csv.lines().count() > 200);
 
-    // For programs; and what a device refuses is shown with its reason.
+    // As JSON; and a refusal of the device is shown with its reason.
     let run = Run::of(&mut board.operate(&folder, &["reference.toml", "--json", "status", "config"]));
     let document: serde_json::Value = serde_json::from_str(&run.stdout).unwrap();
     assert_eq!(document["result"]["status"]["stands"], "disarmed", "{document:#}");
@@ -137,7 +137,7 @@ fn a_script_runs_a_wave_and_fetches_its_record() {
     run.says(1, &["a board cannot be stopped; `ramp-down` switches its amplifiers off"]);
     let run = Run::of(&mut board.operate(&folder, &["set gauge[0]=1"]));
     run.says(2, &["`gauge[0]` cannot be set; these can: command, selector"]);
-    // A mistake in the last line is found before the first is carried out.
+    // An error in the last line is found before the first is executed.
     for (last, code, text) in [
         (
             "set command=x",
@@ -147,7 +147,7 @@ fn a_script_runs_a_wave_and_fetches_its_record() {
         ("wave none.toml", 1, "`none.toml` cannot be read: there is no such file"),
         ("play case-1 correction=none.json machine=m", 1, "`none.json` cannot be read: there is no such file"),
         ("config write none.toml", 1, "none.toml is refused"),
-        // Whichever comes first: what the session reads is not written.
+        // In either order: an input of the session is not overwritten.
         ("wave wave.toml; record download wave.toml", 2, "it is an input of this command, `wave.toml`"),
         ("record download wave.toml; on-edge wave wave.toml", 2, "it is an input of this command, `wave.toml`"),
         ("record download reference.toml", 2, "it is an input of this command, `reference.toml`"),
@@ -160,14 +160,14 @@ fn a_script_runs_a_wave_and_fetches_its_record() {
     }
     let run = Run::of(&mut board.operate(&folder, &["record download legs.toml/x.rec"]));
     assert_eq!(run.code, 3, "{run:?}");
-    // Another controller is not operated.
+    // Another controller is refused.
     let run = Run::of(&mut board.operate(&folder, &["legs.toml", "arm"]));
     run.says(1, &["the device runs the controller `reference` of spec digest"]);
     assert!(board.is(Phase::Disarmed));
 }
 
 const UP: [&str; 5] = ["reference.toml", "arm", "wait arming 20", "run", "wait running 20"];
-/// Target of the last tick, from rest: the bias of 10 µm is in it.
+/// Target of the last tick relative to rest, including the bias of 10 µm.
 const TARGETS: [(&str, f64); 4] =
     [("target[0]_m", 0.0), ("target[1]_m", 1e-6), ("target[2]_m", 11.5e-6), ("target[3]_rad", 2e-6)];
 const MOVE: &str = "move x=0 y=0 z=2um rx=0 ry=0 rz=0";
@@ -175,15 +175,15 @@ const MOVE: &str = "move x=0 y=0 z=2um rx=0 ry=0 rz=0";
 #[test]
 fn moves_in_words_are_taken_or_refused_and_no_axis_is_guessed() {
     let folder = Folder::new();
-    let board = Served::new(&folder);
+    let board = SocketBoard::new(&folder);
     let operate = |script: &[&str]| Run::of(&mut board.operate(&folder, script));
-    // A machine whose session ended early has lost its host: down at once, for otherwise it holds for ten seconds.
+    // A machine whose session ended has lost its host: ramp it down immediately, because otherwise it holds for ten seconds.
     let recover = || {
         operate(&["reference.toml", "ramp-down", "wait disarmed 60"]).says(1, &["faulted: link lost"]);
         wait(&board, Phase::Faulted);
         operate(&["reference.toml", "acknowledge", "wait disarmed 20"]).says(0, &[]);
     };
-    // What makes no sense is refused before anything is asked.
+    // Invalid commands are refused before anything is sent.
     for (script, text) in [
         (&[MOVE, "jog z=1"][..], "z needs a unit of"),
         (&["goto there"], "there is no pose `there`: `mark there` first; known poses: zero"),
@@ -232,7 +232,7 @@ fn moves_in_words_are_taken_or_refused_and_no_axis_is_guessed() {
     ] {
         assert!(run.stdout.contains(text), "{text:?}: {}", run.stdout);
     }
-    // Turned about a point 10 mm below by 50 urad about y, that point stays, and what is controlled moves by half a micrometre.
+    // A rotation by 50 urad about y, about a point 10 mm below, keeps that point and moves the tool point by half a micrometre.
     let frame = "rz 87266.463 urad; tool point at x 0.000 um, y 0.000 um, z -10000.000 um";
     assert!(run.stdout.contains("        0.5000     ") && run.stdout.contains(frame), "{}", run.stdout);
     // The platform's own target, as the controller computed it.
@@ -248,7 +248,7 @@ fn moves_in_words_are_taken_or_refused_and_no_axis_is_guessed() {
         assert!((value - expected).abs() < 1e-15, "{name}: {value}");
     }
 
-    // A trajectory that was asked for is waited for. Gains that are unstable are not sent, as the spec would be refused.
+    // `wait` includes a requested trajectory. Unstable gains are not sent, just as such a spec would be refused.
     let script = ["wait arrived 20", "play case-1", "wait arrived 20", "jog z=0.1um", "gains kp=1e9"];
     let run = operate(&[&UP[..], &script].concat());
     run.says(1, &["not sent: E04"]);
@@ -256,12 +256,12 @@ fn moves_in_words_are_taken_or_refused_and_no_axis_is_guessed() {
     let run = operate(&["reference.toml", "status"]);
     assert!(run.code == 0 && run.stdout.contains("`arm`, then `run`"), "{run:?}");
 
-    // Beyond the workspace nothing moves, and while a motion is under way nothing is promised.
+    // A move beyond the workspace is refused, and so is a move during a motion.
     let run = operate(&[&UP[..], &["wait arrived 20", MOVE, "wait arrived 20", "jog z=100um"]].concat());
     run.says(1, &["cannot move to x 0.000 um, y 0.000 um, z 102.000 um", "no motion was started"]);
     recover();
 
-    // On the way to the bias, 0.1 s, a command is not looked at yet. A computer that is busy may come after it.
+    // A command is refused during the 0.1 s move to the bias. A busy computer may be too late for that.
     let is_early = (0..5).any(|_| {
         let run = operate(&[&UP[..], &[MOVE]].concat());
         recover();
@@ -273,7 +273,7 @@ fn moves_in_words_are_taken_or_refused_and_no_axis_is_guessed() {
 #[test]
 fn a_fault_ends_a_script_with_its_cause_and_lines_go_on_after_a_mistake() {
     let folder = Folder::new();
-    let board = Served::new(&folder);
+    let board = SocketBoard::new(&folder);
     let mut lines = board
         .operate(&folder, &["reference.toml"])
         .stdin(Stdio::piped())
@@ -301,7 +301,7 @@ fn a_fault_ends_a_script_with_its_cause_and_lines_go_on_after_a_mistake() {
     let shown = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(1), "{shown}");
     assert!(shown.contains("the machine is faulted: converter, at tick "), "{shown}");
-    // One acknowledgement starts the converters again; what happened is told however often the link was polled since, and once.
+    // One acknowledgement restarts the converters. Events are reported once, however often the link was polled before.
     board.fails.store(false, Ordering::Relaxed);
     let script = ["reference.toml", "acknowledge", "wait disarmed 20", "wait 0.2", "status", "status"];
     let run = Run::of(&mut board.operate(&folder, &script));
@@ -316,7 +316,7 @@ fn a_fault_ends_a_script_with_its_cause_and_lines_go_on_after_a_mistake() {
 #[test]
 fn ctrl_c_ramps_down_and_waits() {
     let folder = Folder::new();
-    let board = Served::new(&folder);
+    let board = SocketBoard::new(&folder);
     let script = ["reference.toml", "arm", "wait arming 20", "run", "wait running 20", "wait 60"];
     let running = board.operate(&folder, &script).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
     wait(&board, Phase::Running);
@@ -329,7 +329,7 @@ fn ctrl_c_ramps_down_and_waits() {
     assert!(board.is(Phase::Disarmed));
 }
 
-fn wait(board: &Served, phase: Phase) {
+fn wait(board: &SocketBoard, phase: Phase) {
     let start = Instant::now();
     while !board.is(phase) {
         assert!(start.elapsed() < Duration::from_secs(60), "{:?}", board.phase);

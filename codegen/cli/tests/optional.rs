@@ -8,7 +8,7 @@ use crate::support::{Folder, Run, length};
 use serde_json::Value;
 use specgen::target;
 
-/// The main job on the legs, with tools searched in `tools` alone.
+/// The main job on the legs, with `PATH` set to `tools`.
 fn main_job(folder: &Folder, tools: &Path, more: &[&str]) -> Command {
     let mut command = folder.command();
     command
@@ -51,7 +51,7 @@ fn without_tools_everything_else_is_done_and_one_line_says_what_was_left_out() {
         assert!(folder.path("out").join(file).is_file(), "{file}");
     }
 
-    // Required, it is exit code 3 with the same result.
+    // If they are required, exit code 3 with the same result.
     if length(false, true) {
         let run = Run::of(&mut main_job(&folder, nothing.path(), &["--require-target"]));
         run.says(3, &["error: skipped: the image for the microcontroller"]);
@@ -96,7 +96,7 @@ fn without_the_emulator_alone_the_image_is_built_and_looked_at() {
         crate::support::skipped("the cross compiler here is more than two programs");
         return;
     }
-    // An emulator that does not run is as good as none.
+    // An emulator that does not run counts as missing.
     std::fs::write(tools.path().join("qemu-system-arm"), "").unwrap();
     let run = Run::of(&mut main_job(&folder, tools.path(), &["--json"]));
     let document = json(&run);
@@ -109,7 +109,7 @@ fn without_the_emulator_alone_the_image_is_built_and_looked_at() {
     assert!(missing.starts_with("skipped: running the image"), "{missing}");
     assert!(missing.contains("apt-get install qemu-system-arm"), "{missing}");
     assert_eq!(missing.lines().count(), 1);
-    // State and settings are not in what is known of the RAM: there is no figure of it, and it says so.
+    // Without the size of state and settings there is no RAM figure, and the text says so.
     let verdict = &document["result"]["verdict"];
     let figures: Vec<&str> =
         verdict["figures"].as_array().unwrap().iter().filter_map(|one| one["name"].as_str()).collect();
@@ -118,8 +118,7 @@ fn without_the_emulator_alone_the_image_is_built_and_looked_at() {
     assert!(image["used"]["ram"].is_null() && image["ram_static"].is_u64(), "{document:#}");
 }
 
-/// The README shows what the command prints, but for where the spec lies, and with another compiler than the README names for what
-/// that decides.
+/// Asserts that the README shows the command's output, except for the path of the spec, and for figures that depend on the compiler.
 fn is_shown_in_the_readme(lines: &[&str], compiler: &str) {
     let readme = std::fs::read_to_string(crate::support::repository().join("README.md")).unwrap();
     let version = compiler.split(' ').nth(1).unwrap();
@@ -141,7 +140,7 @@ fn is_shown_in_the_readme(lines: &[&str], compiler: &str) {
     }
 }
 
-/// At most ten lines of at most eighty letters, built and measured; and why not, where it is not ready.
+/// At most ten lines of at most eighty letters, after a build with measurements, or with the reason why it is not ready.
 #[test]
 fn the_main_job_answers_in_ten_lines() {
     let Some(tools) = crate::support::tools() else { return };
@@ -155,7 +154,7 @@ fn the_main_job_answers_in_ten_lines() {
         ),
         ("small.toml", 1, ["legs is NOT ready: instructions 2,", "> 300", "  next     specgen size small.toml"]),
     ];
-    // One of them is not ready, which takes another controller: in the full run.
+    // One that is not ready needs another controller, so only in the full run.
     for (spec, code, words) in jobs.into_iter().take(length(1, 2)) {
         let run = folder.run(&[spec, "-o", "out/made"]);
         assert_eq!(run.code, code, "{run:?}");

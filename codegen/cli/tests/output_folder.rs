@@ -1,4 +1,4 @@
-//! The output folder is written whole or not at all, and no work of a user is overwritten.
+//! The output folder is written completely or not at all, and user files are not overwritten.
 
 use std::fs;
 use std::os::unix::fs::symlink;
@@ -81,7 +81,7 @@ fn a_file_that_is_no_longer_made_goes_and_a_deleted_one_comes_back() {
     let fresh = listing(&folder.path("out"));
     fs::create_dir_all(folder.path("out/controller/old/deep")).unwrap();
     folder.write("out/controller/old/deep/stale.rs", "// of an older version");
-    // An older version of the manifest; a path that leads out of the folder is not ours.
+    // An older version of the manifest; a path outside of the folder is not ours.
     folder.write("victim", "precious");
     let mut manifest = folder.read("out/.specgen");
     manifest += &format!("{}  controller/old/deep/stale.rs\n", digest(b"// of an older version"));
@@ -98,7 +98,7 @@ fn a_target_that_is_built_for_no_more_leaves_only_what_cargo_made_and_may_come_b
     let folder = Folder::new();
     write(&folder);
     let fresh = listing(&folder.path("out"));
-    // As another target's folder, built in; cargo changed its lock file.
+    // A folder of another target, used for a build; cargo changed its lock file.
     fs::create_dir_all(folder.path("out/rt-pc/target")).unwrap();
     folder.write("out/rt-pc/target/rt-pc", "built");
     folder.write("out/rt-pc/Cargo.lock", "changed by cargo");
@@ -114,13 +114,13 @@ fn a_target_that_is_built_for_no_more_leaves_only_what_cargo_made_and_may_come_b
     }
     fs::remove_dir_all(folder.path("out/rt-pc")).unwrap();
     assert_eq!(listing(&folder.path("out")), fresh);
-    // Anything else in it belongs to a user.
+    // Other files in it belong to the user.
     fs::create_dir_all(folder.path("out/rt-pc/src")).unwrap();
     folder.write("out/rt-pc/src/main.rs", "mine");
     refused(&folder, "out", 1, &["rt-pc/"]);
 }
 
-/// Cargo makes a lock file beside a manifest of ours; any other belongs to a user.
+/// A lock file beside one of our manifests is cargo's; any other belongs to the user.
 #[test]
 fn a_lock_file_in_a_folder_that_specgen_did_not_write_is_not_overwritten() {
     let folder = Folder::new();
@@ -131,20 +131,20 @@ fn a_lock_file_in_a_folder_that_specgen_did_not_write_is_not_overwritten() {
         refused(&folder, "theirs", 1, &[&format!("were changed since: {named};")]);
         fs::remove_dir_all(folder.path("theirs")).unwrap();
     }
-    // Nor one in a folder of an output that is no package.
+    // Nor one in a folder of the output that is not a package.
     write(&folder);
     folder.write("out/controller/src/Cargo.lock", "precious");
     refused(&folder, "out", 1, &["controller/src/Cargo.lock"]);
 }
 
-/// The states that a run may be killed in are made by hand; those that come about are in `kills`.
+/// States that a killed run can leave, made by hand; `kills` tests real ones.
 #[test]
 fn what_a_killed_run_left_is_taken_up() {
     let folder = Folder::new();
     write(&folder);
     let fresh = folder.listing();
     let work = folder.path(".out.specgen");
-    // After the swap: cargo's folder and what a user had put there meanwhile lie in the old output.
+    // After the swap: cargo's folder and new user files are in the old output.
     for (path, text) in [("target/object.o", "built"), ("Cargo.lock", "locked")] {
         fs::create_dir_all(folder.path("out/target")).unwrap();
         fs::write(folder.path("out").join(path), text).unwrap();
@@ -157,7 +157,7 @@ fn what_a_killed_run_left_is_taken_up() {
     write(&folder);
     assert_eq!(folder.listing(), with_target);
 
-    // What is not cargo's comes back too, and is then a user's file in the way.
+    // Files that are not cargo's are also restored, and are then user files in the way.
     fs::create_dir(&work).unwrap();
     fs::rename(folder.path("out"), work.join("new")).unwrap();
     fs::write(work.join("new/notes.txt"), "mine").unwrap();
@@ -165,19 +165,19 @@ fn what_a_killed_run_left_is_taken_up() {
     assert_eq!(folder.read("out/notes.txt"), "mine");
     fs::remove_dir_all(folder.path("out")).unwrap();
 
-    // Before it: new files without their manifest are not whole.
+    // Before the swap: new files without their manifest are incomplete.
     fs::create_dir_all(work.join("new/controller")).unwrap();
     fs::write(work.join("new/controller/half.rs"), "fn ha").unwrap();
     write(&folder);
     assert_eq!(folder.listing(), fresh);
-    // In the midst of files that are replaced one by one; the manifest knows both.
+    // While files are replaced one by one; the manifest has both versions.
     fs::create_dir_all(work.join("old")).unwrap();
     fs::rename(folder.path("out/README.md"), work.join("old/README.md")).unwrap();
     write(&folder);
     assert_eq!(folder.listing(), fresh);
 }
 
-/// Both at once is neither a mixture nor a mistake of the user.
+/// Two simultaneous runs neither mix files nor report an error of the user.
 #[test]
 fn runs_at_once_write_one_after_the_other() {
     let folder = Folder::new();
@@ -256,7 +256,7 @@ fn what_is_no_folder_is_not_overwritten() {
     refused(&folder, "link", 1, &["`link` exists and is not a folder"]);
 }
 
-/// An empty folder where a file is due is replaced; it holds nothing.
+/// An empty folder in place of a file is replaced.
 #[test]
 fn an_empty_folder_in_the_way_of_a_file_does_no_harm() {
     let folder = Folder::new();
@@ -277,7 +277,7 @@ fn a_refused_run_leaves_no_folder_behind() {
     folder.spec("bad-record.toml", &[("records/reference-forc.csv", "records/bad.csv")]);
     folder.write("records/bad.csv", "time_s,drive_V\n0,1\n");
     folder.spec("unstable.toml", &[("level_weight = 0.252", "level_weight = 1.0")]);
-    // Accepted by every check of the spec, refused where its constants are computed.
+    // Accepted by all checks of the spec, but refused when its constants are computed.
     folder.spec(
         "coarse.toml",
         &[
@@ -315,7 +315,7 @@ fn without_permission_nothing_changes() {
         assert_eq!(folder.listing(), before, "{output}");
     }
 
-    // The first of the missing parents can be made, the second not: its user masks all permissions.
+    // The first missing parent can be created, the second cannot, because the umask removes all permissions.
     let plain = user.command(&folder);
     let mut masked = Command::new("sh");
     masked.args(["-c", "umask 0777; exec \"$@\"", "sh"]).arg(plain.get_program()).args(plain.get_args());
@@ -323,7 +323,7 @@ fn without_permission_nothing_changes() {
     Run::of(&mut masked).says(3, &["could not write `a/b/out`", "nothing was changed"]);
     assert_eq!(folder.listing(), before);
 
-    // The failure comes in the middle: some files are moved by then, and must come back.
+    // The failure comes in the middle: some files are already moved, and must be restored.
     assert_eq!(user.run(&folder, &arguments("out")).code, 0);
     folder.write("out/controller/old.rs", "// older");
     folder
@@ -336,7 +336,7 @@ fn without_permission_nothing_changes() {
     assert_eq!(user.run(&folder, &arguments("out")).code, 0);
     assert!(!folder.path("out/controller/old.rs").exists());
 
-    // A folder that cannot be read cannot be judged.
+    // A folder that cannot be read cannot be checked.
     set_mode(&folder.path("out"), 0o333);
     user.run(&folder, &arguments("out")).says(3, &["could not read `out`"]);
     set_mode(&folder.path("out"), 0o755);

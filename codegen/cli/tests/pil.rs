@@ -1,6 +1,6 @@
-//! Processor in the loop, as a user runs it: an image in QEMU and a board at a serial port; what ends it, and what it says then.
+//! Processor in the loop, as a user runs it: an image in QEMU, a board at a serial port, and errors of both.
 //!
-//! Needs a cross compiler and QEMU but for the serial port; without them it skips.
+//! Needs a cross compiler and QEMU, except for the serial port; without them it skips.
 
 mod board;
 
@@ -13,7 +13,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use crate::support::{BINARY, Run, repository};
-use board::{Board, Stepped};
+use board::{Board, SteppedMachine};
 use host_sim::controller::{Controller, Supervised, TickController};
 use serde_json::Value;
 use specgen::model::Mcu;
@@ -46,7 +46,7 @@ fn document(command: &mut Command, code: i32) -> Value {
     value
 }
 
-/// The image of six legs, with a file of it beside the workspace, and the controller on this machine.
+/// The image of six legs, its file outside of the workspace, and the controller on this computer.
 fn legs(folder: &Path) -> (Image, PathBuf, Supervised) {
     let image = built(folder, true).unwrap();
     let file = folder.with_extension("elf");
@@ -59,7 +59,7 @@ fn supervised(folder: &Path) -> Supervised {
     Supervised::new(Controller::load(&library).unwrap())
 }
 
-/// Writes the workspace of six legs; its image, if it is wanted.
+/// Writes the workspace of six legs, and builds its image if `image`.
 fn built(folder: &Path, image: bool) -> Option<Image> {
     let compiled = specgen::compile::compile(Path::new(&spec("legs.toml"))).unwrap();
     drop(specgen::workspace::write(folder, &compiled.files).unwrap());
@@ -67,7 +67,7 @@ fn built(folder: &Path, image: bool) -> Option<Image> {
 }
 
 fn number(value: &Value) -> f64 {
-    value.as_f64().unwrap_or_else(|| panic!("{value} is no number"))
+    value.as_f64().unwrap_or_else(|| panic!("{value} is not a number"))
 }
 
 #[test]
@@ -90,7 +90,7 @@ fn six_legs_and_a_platform_are_bit_equal_in_closed_loop_and_legs_outrun_real_tim
             result["tracking"]["rows"].as_array().unwrap().iter().map(|row| row["mode"].as_str().unwrap()).collect();
         assert_eq!(modes, ["invhys", "ewma", "pcc"]);
         let error = number(&result["tracking"]["rows"][2]["rmse_nm"]);
-        // Nanometres: the loop is closed. Invhys alone leaves hundreds.
+        // Nanometres show that the loop is closed; invhys alone leaves hundreds.
         assert!((5.0..60.0).contains(&error), "{error} nm");
         let whole = &result["costs"][0];
         assert_eq!(
@@ -116,7 +116,7 @@ fn six_legs_and_a_platform_are_bit_equal_in_closed_loop_and_legs_outrun_real_tim
         ));
         return;
     }
-    // Emulator and simulator take turns: on a machine that is busy with other things each turn waits for its time.
+    // Emulator and simulator alternate, so a busy computer delays every tick.
     let load = std::fs::read_to_string("/proc/loadavg").unwrap_or_default();
     let load: f64 = load.split(' ').next().and_then(|text| text.parse().ok()).unwrap_or(0.0);
     let idle = std::thread::available_parallelism().map_or(1, usize::from) as f64;
@@ -132,7 +132,7 @@ fn six_legs_and_a_platform_are_bit_equal_in_closed_loop_and_legs_outrun_real_tim
     assert!(number(&result["ticks"]) > 2000.0);
     let row = &result["free_motion"][0];
     assert_eq!((&row["trajectory"], &row["mode"]), (&"case-1".into(), &"pf-pcc".into()), "{row:#}");
-    // A part was asked for, and the figure says so.
+    // Only part of the trajectory was requested, and the figure says so.
     assert!(
         (number(&row["seconds"]) - 0.1).abs() < 1e-9 && (number(&row["path_seconds"]) - 0.25).abs() < 1e-9,
         "{row:#}"
@@ -151,7 +151,7 @@ fn a_flipped_bit_in_a_table_of_the_image_is_found_with_its_tick_and_signal() {
     let (image, file, _) = legs(&folder);
     let compiled = specgen::compile::compile(Path::new(&spec("legs.toml"))).unwrap();
     let table = &compiled.ir.hysteresis.tables[0];
-    // A node in the middle of the table, by its bits and those of its neighbours.
+    // A node in the middle of the table, found by its bits and those of its neighbours.
     let middle = table.len() / 2;
     let bytes: Vec<u8> = table[middle..middle + 4].iter().flat_map(|node| node.to_bits().to_le_bytes()).collect();
     let place = image.elf.windows(bytes.len()).position(|window| window == bytes).unwrap();
@@ -233,7 +233,7 @@ fn ctrl_c_ends_it_with_what_was_done_and_leaves_no_emulator() {
         assert!(start.elapsed() < Duration::from_secs(60), "no emulator was started");
         let list = std::fs::read_to_string(&children).unwrap_or_default();
         let is_emulator = |id: &&str| {
-            // Before the run it is asked for its version.
+            // Before the run its version is queried.
             let words = std::fs::read_to_string(format!("/proc/{id}/cmdline")).unwrap_or_default();
             words.contains("image.elf")
         };
@@ -269,7 +269,7 @@ fn a_board_at_a_serial_port_is_stepped_like_the_emulator() {
         let port = board.port.display().to_string();
         document(&mut pil(&spec("legs.toml"), &folder, &["--mode", "pcc", "--seconds", "0.05", "--port", &port]), code)
     };
-    let quiet = Board::plug(Some(Stepped::new(supervised(&folder))), 0);
+    let quiet = Board::plug(Some(SteppedMachine::new(supervised(&folder))), 0);
     let value = at(&quiet, 0);
     let counters = quiet.unplug();
     let result = &value["result"];
@@ -277,15 +277,15 @@ fn a_board_at_a_serial_port_is_stepped_like_the_emulator() {
     assert_eq!((&result["counted"], &result["costs"][0]["calls"]), (&"cycles".into(), &result["ticks"]));
     assert!(number(&result["ticks"]) > 250.0 && counters.errors() == 0, "{counters:?}");
 
-    // Over a bad line the same ticks, some of them asked for again.
-    let noisy = Board::plug(Some(Stepped::new(supervised(&folder))), 20_000);
+    // The same ticks over a noisy line, with some requests repeated.
+    let noisy = Board::plug(Some(SteppedMachine::new(supervised(&folder))), 20_000);
     let again = at(&noisy, 0);
     let counters = noisy.unplug();
     assert_eq!(again["result"]["tracking"], result["tracking"]);
     assert_eq!(again["result"]["costs"], result["costs"]);
     assert!(counters.errors() > 0, "{counters:?}");
 
-    let mut wrong = Stepped::new(supervised(&folder));
+    let mut wrong = SteppedMachine::new(supervised(&folder));
     wrong.flip = Some((100, 3));
     let value = at(&Board::plug(Some(wrong), 0), 1);
     let difference = &value["result"]["first_difference"];
@@ -294,7 +294,7 @@ fn a_board_at_a_serial_port_is_stepped_like_the_emulator() {
         (&100.into(), &"voltage[3]".into(), &1.into())
     );
 
-    let other = Stepped::new(supervised(&folder)).pretend("0123");
+    let other = SteppedMachine::new(supervised(&folder)).pretend("0123");
     let error = at(&Board::plug(Some(other), 0), 1)["error"].as_str().unwrap().to_owned();
     assert!(error.contains("spec digest 0123") && error.contains("build and flash it"), "{error}");
 

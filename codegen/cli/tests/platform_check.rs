@@ -1,10 +1,10 @@
-//! `specgen check` on a platform: what is reported, and that what a refusal offers is accepted when put into the file.
+//! `specgen check` on a platform: its report, and that values offered by a refusal are accepted in the file.
 
 use std::fs;
 
 use crate::support::{Folder, repository};
 
-/// The folder, with `name` beside the records; its paths to them are fixed.
+/// A folder with the spec `name`, with adjusted paths of records.
 fn folder(name: &str) -> (Folder, String) {
     let folder = Folder::new();
     let text = fs::read_to_string(repository().join("specs").join(name)).unwrap();
@@ -90,7 +90,7 @@ fn a_bandwidth_that_is_too_high_is_refused_and_the_offer_is_accepted() {
     let fixed = bad.replace("5000 rad/s", &value("level_bandwidth")).replace("19.6 rad/s", &value("drift_bandwidth"));
     folder.write("fixed.toml", &fixed);
     let found = folder.json(&["check", "fixed.toml"]);
-    // The gains of this spec were chosen beside a slower estimate: they may be refused in their turn, the bandwidth not.
+    // The gains of this spec were chosen for a slower estimate, so they may be refused next, but not the bandwidth.
     let keys: Vec<&str> = found.findings().iter().map(|one| one["key"].as_str().unwrap()).collect();
     assert!(!keys.contains(&"adaptation.level_bandwidth") || found.code == 0, "{keys:?}");
 }
@@ -112,7 +112,7 @@ fn a_bound_and_a_bias_beyond_the_strokes_are_refused() {
 #[test]
 fn a_declared_trajectory_beyond_the_strokes_is_refused_at_its_place() {
     let (folder, text) = folder("reference.toml");
-    // From the middle of the strokes case 1, which climbs by 40 um, leaves them at the top.
+    // From the middle of the strokes, case 1 rises by 40 um, beyond their upper end.
     let lifted = text
         .replace("bias         = [\"0 um\", \"0 um\", \"10 um\"", "bias         = [\"0 um\", \"0 um\", \"30 um\"")
         .replace("translation = [\"50 um\", \"50 um\", ", "translation = [\"50 um\", \"50 um\", \"72 um\"] # ");
@@ -141,13 +141,13 @@ fn warnings_are_denied_unless_the_spec_says_why() {
     let reason = "[lint]\nallow = [\"amplifier.noise: lent until the new one comes\"]\n";
     folder.write("allowed.toml", format!("{noisy}\n{reason}"));
     folder.run(&["check", "allowed.toml", "--deny-warnings"]).says(0, &["N0891", "lent until"]);
-    // Far off is refused in any case, and let pass in the same way.
+    // A value far off is refused in any case, and exempted in the same way.
     let far = noisy.replace("\"100 mV\"", "\"2 V\"");
     folder.write("far.toml", &far);
     folder.run(&["check", "far.toml"]).says(1, &["E0890", "amplifier.noise", "66.67 times beyond"]);
     folder.write("far.toml", format!("{far}\n{reason}"));
     assert_eq!(folder.run(&["check", "far.toml", "--deny-warnings"]).code, 0);
-    // An exception needs a key and a reason, and something to let pass.
+    // An exemption needs a key, a reason, and a finding to exempt.
     for (entry, code) in [("amplifier.noise", "E0329"), ("amplifier.nose: old", "E0329"), ("dac.bits: old", "W0892")] {
         folder.write("bad.toml", format!("{text}\n[lint]\nallow = [\"{entry}\"]\n"));
         folder.run(&["check", "bad.toml", "--deny-warnings"]).says(1, &[code]);

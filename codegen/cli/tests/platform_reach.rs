@@ -1,4 +1,4 @@
-//! Reach of the reference platform against the study's figures and against leg lengths by Pythagoras.
+//! Reach of the reference platform, compared with the study's figures and with leg lengths by Pythagoras.
 
 use std::path::Path;
 
@@ -105,10 +105,10 @@ fn no_pose_of_the_workspace_needs_more_than_the_bound_and_the_shrunk_box_is_reac
             // A tenth of a nanometre for the curvature inside the box.
             assert!(low > -1e-10 && high < reach.stroke + 1e-10, "{shrunk:?}: {low:e} {high:e}");
         }
-        // The bound is one, not a guess: it exceeds what is needed by less than a hundredth.
+        // The bound is tight: it exceeds the required travel by less than a hundredth.
         let needed = reach.demanded[1].max(-reach.demanded[0]);
         assert!(reach.demanded_bound < 1.01 * needed, "{} {needed}", reach.demanded_bound);
-        // And the share is the largest: a little more, and some corner is beyond.
+        // The share is the largest possible: with a little more, some corner is out of reach.
         let beyond = (0..64).any(|corner| {
             let pose: Pose = std::array::from_fn(|axis| {
                 let at = if corner >> axis & 1 == 0 { -bounds[axis] } else { bounds[axis] };
@@ -177,7 +177,7 @@ fn a_path_beyond_the_strokes_is_refused_and_the_shift_offered_makes_it_fit() {
     let turned = path(PaperPath::Case2, 0.0).into_iter().map(|[x, y, z, a, b, c]| [x, y, z, 1e3 * a, 1e3 * b, 1e3 * c]);
     let found = reach::check_poses(&model, &platform, 60e-6, ["trajectory[1].kind", "case-2"], turned).unwrap_err();
     assert!(found[0].help.starts_with("no z of"), "{found:?}");
-    // A pose that is no number is beyond every stroke.
+    // A pose that is not a number is out of reach.
     let none = reach::check_poses(&model, &platform, 60e-6, ["trajectory", "x"], [[f64::NAN; 6]].into_iter());
     assert!(none.is_err());
 }
@@ -227,7 +227,7 @@ fn conditioning_is_that_of_the_jacobian_by_differences() {
     let values = jacobian.singular_values();
     assert!((values.max() / values.min() - reach.conditioning.at_rest).abs() < 1e-6);
     assert!((values.min() - reach.conditioning.smallest_singular_value).abs() < 1e-3);
-    // Nowhere within the promised motion is J near singular.
+    // J is nowhere near singular within the declared motion.
     let free = reach.conditioning.free_of_singularities;
     assert!(free > 1e-3);
     let mut random = ChaCha8Rng::seed_from_u64(3);

@@ -1,4 +1,4 @@
-//! What `specgen check` says of rate options that do not fit together.
+//! Findings of `specgen check` about inconsistent rate options.
 
 use std::fs;
 

@@ -7,7 +7,7 @@ use serde_json::Value;
 
 use crate::support::{Folder, length};
 
-/// A field of a record of MCAP, taken from its front: a number, or what has its length in front.
+/// Takes a field from the front of an MCAP record: a number, or data after its length.
 fn number(bytes: &mut &[u8], size: usize) -> u64 {
     let (field, rest) = bytes.split_at(size);
     *bytes = rest;
@@ -21,7 +21,7 @@ fn text<'a>(bytes: &mut &'a [u8]) -> &'a str {
     std::str::from_utf8(text).unwrap()
 }
 
-/// Kinds and contents of records, with the place of each.
+/// Offset, kind and content of each record.
 fn records(bytes: &[u8]) -> Vec<(usize, u8, &[u8])> {
     let (mut rest, mut all) = (bytes, Vec::new());
     while !rest.is_empty() {
@@ -34,7 +34,7 @@ fn records(bytes: &[u8]) -> Vec<(usize, u8, &[u8])> {
     all
 }
 
-/// Every message: topic, time, schema, value; as the specification of the format has it, whose index is held against the data.
+/// Every message (topic, time, schema, value), parsed by the specification of the format; also checks the index.
 fn messages(bytes: &[u8]) -> Vec<(String, u64, Value, Value)> {
     const MAGIC: &[u8] = b"\x89MCAP0\r\n";
     let inner = bytes.strip_prefix(MAGIC).and_then(|bytes| bytes.strip_suffix(MAGIC)).unwrap();
@@ -73,7 +73,7 @@ fn messages(bytes: &[u8]) -> Vec<(String, u64, Value, Value)> {
                     all.push((topic.clone(), time, schemas[schema].clone(), value));
                 }
             }
-            // An index of a chunk: it stands where the index says, and covers its times.
+            // The index of a chunk has its offset and its times.
             8 => {
                 let [begin, end, place, _] = [(); 4].map(|()| number(&mut fields, 8));
                 let (_, kind, chunk) =
@@ -89,7 +89,7 @@ fn messages(bytes: &[u8]) -> Vec<(String, u64, Value, Value)> {
     all
 }
 
-/// MCAP, read back, against the CSV of the same run.
+/// Compares MCAP with the CSV of the same run.
 fn messages_say_what_the_rows_say(bytes: &[u8], names: &str, rows: &str, spec: &str) {
     let mut found: BTreeMap<String, Vec<(u64, Value)>> = BTreeMap::new();
     for (topic, time, schema, value) in messages(bytes) {
@@ -112,13 +112,13 @@ fn messages_say_what_the_rows_say(bytes: &[u8], names: &str, rows: &str, spec: &
         assert_eq!(number("/codes", "leg3").to_bits(), cell(row, "dac_code[3]").to_bits());
         assert_eq!(number("/volts", "leg5").to_bits(), cell(row, "voltage[5]_V").to_bits());
         assert_eq!(number(&format!("/{at}"), key).to_bits(), cell(row, &format!("{at}[2]_m")).to_bits());
-        // The CSV has seven digits of it.
+        // The CSV has only seven digits.
         let error = cell(row, "error[2]_m");
         assert!((number("/error", key) - error).abs() <= 1e-6 * error.abs(), "row {k}");
         let gauge = if legs { "displacement[2]_m" } else { "gauge[2]" };
         assert_eq!(number("/gauges", "gauge2").to_bits(), cell(row, gauge).to_bits());
     }
-    // Those that change seldom hold until they are said again.
+    // Signals that change seldom keep their value until the next message.
     let held = |topic: &str, time: u64| {
         let said = found[topic].iter().take_while(|(at, _)| *at <= time);
         said.last().unwrap().1.clone()
@@ -160,7 +160,7 @@ fn what_sim_records_replays_bit_for_bit_and_a_changed_bit_does_not() {
         let result = &replayed.value["result"];
         assert_eq!((replayed.code, &result["bit_equal"]), (0, &true.into()), "{spec}: {result}");
         assert_eq!(result["ticks"], recorded.value["result"]["ticks"]);
-        // For people: what the words mean, volts, and where the platform or the legs were and were to be.
+        // Decoded values: meanings of the words, volts, and pose and target of the platform or the legs.
         let more = ["replay", "run.rec", "--spec", spec, "--csv", "out/run.csv", "--plot", "out/run.svg"];
         assert_eq!(folder.run(&[&more[..], &["--mcap", "out/run.mcap"]].concat()).code, 0);
         let csv = folder.read("out/run.csv");
@@ -183,7 +183,7 @@ fn what_sim_records_replays_bit_for_bit_and_a_changed_bit_does_not() {
         folder.write("bad.rec", bytes);
         let text = folder.run(&["replay", "bad.rec", "--spec", spec]);
         assert!(text.code == 1 && text.stdout.contains("is damaged"), "{spec}: {} {}", text.stdout, text.stderr);
-        // What is left is exported, and said to have a hole.
+        // The rest is exported, and the gap is reported.
         let exported = folder.run(&["replay", "bad.rec", "--csv", "bad.csv", "--mcap", "bad.mcap"]);
         exported.says(1, &["is damaged", "its rows are missing"]);
         assert!(folder.path("bad.csv").is_file());

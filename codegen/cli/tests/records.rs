@@ -1,5 +1,5 @@
-//! A record that is no use is refused with the line or time, what was expected, and a fix; nothing is written. Each is made
-//! from a good one, and met both ways: named in a spec, and given to `identify`.
+//! An unusable record is refused with the line or time, the expectation, and a fix; nothing is written. Each is made from a good one,
+//! and tested both in a spec and with `identify`.
 
 use std::fmt::Write as _;
 use std::fs;
@@ -30,14 +30,14 @@ fn csv(rows: &[[f64; 3]]) -> String {
     })
 }
 
-/// The folder with a spec for the bad record, grid 8 as the good one has eight curves.
+/// A folder with a spec for the bad record, with grid 8 because the good one has eight curves.
 fn prepared() -> Folder {
     let folder = Folder::new();
     folder.spec("platform.toml", &[("records/reference-forc.csv", BAD), ("grid    = 32", "grid    = 8")]);
     folder
 }
 
-/// Both ways to meet the record.
+/// The documents of both ways to use the record.
 fn met(folder: &Folder) -> [Document; 2] {
     [
         folder.json(&["platform.toml", "-o", "out", "--no-build"]),
@@ -45,7 +45,7 @@ fn met(folder: &Folder) -> [Document; 2] {
     ]
 }
 
-/// What a refusal must say: line if one is to blame, code, words of the message, words of the fix.
+/// Expected refusal: line, if there is one, code, words of the message, words of the fix.
 struct Expected {
     line: Option<usize>,
     code: &'static str,
@@ -62,7 +62,7 @@ fn expect(
     Expected { line: line.into(), code, message, help }
 }
 
-/// Some finding fits, and both ways to meet the record were refused without writing anything.
+/// Asserts that the record is refused in both ways, with the expected finding, and nothing is written.
 fn refused(content: impl AsRef<[u8]>, expected: &Expected) {
     let folder = prepared();
     folder.write(BAD, content);
@@ -108,7 +108,7 @@ fn with_line(line: usize, new: &str) -> String {
     })
 }
 
-/// Else every refusal below might have another cause.
+/// Otherwise the refusals below might have other causes.
 #[test]
 fn the_unchanged_record_is_accepted_both_ways() {
     let folder = prepared();
@@ -141,7 +141,7 @@ fn a_missing_column_is_named() {
     refused(twice, &expect(1, "E0505", &["`drive_V` appears twice", "columns 2 and 3"], "keep one"));
 }
 
-/// A line of numbers, each with a decimal comma.
+/// A line of numbers with decimal commas.
 fn in_comma_decimals(line: &str) -> String {
     let number = |field: &str| if field.contains('.') { field.replace('.', ",") } else { format!("{field},0") };
     line.split(',').map(number).collect::<Vec<_>>().join(",")
@@ -164,7 +164,7 @@ fn a_value_that_is_no_number_is_named_by_its_line() {
 
 #[test]
 fn time_that_does_not_rise_is_named_by_its_line_and_time() {
-    // Row k stands in line k + 2.
+    // Row k is in line k + 2.
     let repeated = changed(|rows| rows[300][0] = rows[299][0]);
     refused(repeated, &expect(302, "E0510", &["23.359375 s", "must increase"], "delete the repeated sample"));
     let swapped = changed(|rows| rows.swap(300, 301));
@@ -173,7 +173,7 @@ fn time_that_does_not_rise_is_named_by_its_line_and_time() {
     refused(restarted, &expect(302, "E0510", &["23.359375 s to 3.4375 s"], "time column"));
 }
 
-/// A sweep of 5 s a branch that is said to be one of 5 µs.
+/// A sweep with 5 s per branch, labelled as 5 µs.
 #[test]
 fn a_record_in_another_unit_of_time_is_named() {
     let folder = prepared();
@@ -285,7 +285,7 @@ fn a_record_that_does_not_cover_the_declared_range_is_refused() {
         lower,
         &expect(None, "E0606", &["0 V (at 0 s) to 75 V (at 40 s)", "0 V to 100 V", "above 75 V"], "upper end"),
     );
-    // The same good record under other limits, below, above, and around.
+    // The same good record with other limits: below, above, and around it.
     for (limits, code, words) in [
         ("\"0 V\", \"140 V\"", "E0606", ["0 V (at 0 s) to 100 V (at 40 s)", "0 V to 140 V"]),
         ("\"-20 V\", \"100 V\"", "E0606", ["0 V (at 0 s) to 100 V (at 40 s)", "-20 V to 100 V"]),
@@ -306,7 +306,7 @@ fn a_record_that_does_not_cover_the_declared_range_is_refused() {
     }
 }
 
-/// Alone, `identify` can only point at an odd size; a spec knows what its actuator can do.
+/// `identify` alone can only warn about an unusual magnitude; a spec has the stroke of its actuator.
 #[test]
 fn a_displacement_in_another_unit_is_pointed_out_and_refused_by_a_spec() {
     let folder = prepared();
@@ -322,7 +322,7 @@ fn a_displacement_in_another_unit_is_pointed_out_and_refused_by_a_spec() {
         }
         let before = folder.listing();
         let document = folder.json(&["platform.toml", "-o", "out", "--no-build"]);
-        // A unit that no actuator has is refused by itself, one that another actuator might have against the spec's.
+        // An impossible unit is refused in any case, one that another actuator could have only because of the spec's.
         let code = if word.is_some() { "E0623" } else { "E0615" };
         assert_eq!((document.code, &document.finding(code)["file"]), (1, &BAD.into()));
         assert_eq!(folder.listing(), before);

@@ -1,4 +1,4 @@
-//! `specgen report` and `specgen reproduce` as a user runs them: bytes, sizes, and the page in a browser where there is one.
+//! `specgen report` and `specgen reproduce` as a user runs them: bytes, sizes, and the page in a browser, if there is one.
 
 use crate::support;
 use std::path::Path;
@@ -9,14 +9,14 @@ use crate::support::Folder;
 /// Largest report, bytes.
 const LARGEST: usize = 5_000_000;
 
-/// What a browser made of a page.
-struct Drawn {
+/// A page as rendered by a browser.
+struct RenderedPage {
     dom: String,
     console: Vec<String>,
 }
 
-/// The page in headless Chromium, in a window of this width (px); none where there is no such program.
-fn drawn(page: &Path, width: u32) -> Option<Drawn> {
+/// Renders the page in headless Chromium, in a window of this width (px); none if it is not installed.
+fn drawn(page: &Path, width: u32) -> Option<RenderedPage> {
     let profile = tempfile::tempdir().unwrap();
     let run = |program: &str| {
         Command::new(program)
@@ -36,10 +36,10 @@ fn drawn(page: &Path, width: u32) -> Option<Drawn> {
     let output = ["chromium", "chromium-browser", "google-chrome"].into_iter().find_map(run)?;
     let text = String::from_utf8_lossy(&output.stderr).into_owned();
     let console = text.lines().filter(|line| line.contains(":CONSOLE")).map(str::to_owned).collect();
-    Some(Drawn { dom: String::from_utf8_lossy(&output.stdout).into_owned(), console })
+    Some(RenderedPage { dom: String::from_utf8_lossy(&output.stdout).into_owned(), console })
 }
 
-/// Figures of a page: how many there are, and what those without a point are called.
+/// Number of figures of a page, and the names of those without points.
 fn figures(dom: &str) -> (usize, Vec<String>) {
     let mut empty = Vec::new();
     let tags: Vec<&str> = dom.split("<figure ").skip(1).map(|rest| rest.split('>').next().unwrap()).collect();
@@ -52,7 +52,8 @@ fn figures(dom: &str) -> (usize, Vec<String>) {
     (tags.len(), empty)
 }
 
-/// Every figure drawn, nothing in the console, no sideways scroll: on a phone, and in the full run on a desk.
+/// Asserts that every figure is drawn, without console messages or horizontal scrolling, on a phone and, in the full run, on a large
+/// screen.
 #[track_caller]
 fn is_drawn(folder: &Folder, name: &str, expected: &serde_json::Value) {
     for width in support::length(&[390][..], &[1280, 390]) {
@@ -69,19 +70,19 @@ fn is_drawn(folder: &Folder, name: &str, expected: &serde_json::Value) {
     }
 }
 
-/// Whether the numbers of figures stand at the end: as many tables as the heading says.
+/// Asserts that the page ends with the numbers of its figures, with as many tables as its heading says.
 #[track_caller]
 fn has_numbers(page: &str) {
     let (_, rest) = page.split_once("<summary>Numbers of ").unwrap();
     let (count, rest) = rest.split_once(" figures</summary>").unwrap();
     let tables = rest.split("</details>").next().unwrap().matches("<table>").count();
     assert!(tables > 5 && tables == count.parse::<usize>().unwrap(), "{tables} tables of {count} figures");
-    // A chart or a picture of rows is data of the page; each has its table, however often it is shown.
+    // Each chart or image of the page has one table, however often it is shown.
     let kept = page.matches("\"series\":[").count();
     assert!(tables >= kept, "{tables} tables, {kept} charts");
 }
 
-/// Where words stand in a page, in this order.
+/// Asserts that the page has these words in this order.
 #[track_caller]
 fn in_order(page: &str, words: &[&str]) {
     let mut from = 0;
@@ -129,7 +130,7 @@ fn the_report_of_six_legs_is_one_small_page_that_begins_with_the_verdict() {
     }
 }
 
-/// With limits of two kinds, one of which does not hold; and the paper's figures on a page of their own.
+/// With limits of two kinds, one of which is exceeded; and the paper's figures on a separate page.
 #[test]
 fn the_report_of_a_platform_judges_errors_by_their_limits() {
     let folder = Folder::new();
@@ -206,7 +207,7 @@ fn the_papers_page_of_six_legs_has_its_figures_and_tables() {
     is_drawn(&folder, "page-paper.html", &document.value["result"]["paper"]["figures"]);
 }
 
-/// A spec whose workspace holds none of the paper's paths: why is said once, and no figure or table is left empty.
+/// A spec whose workspace is too small for the paper's paths: the reason is given once, and no figure or table is empty.
 #[test]
 #[ignore = "long: another report"]
 fn paths_that_are_refused_leave_no_empty_figure_or_table() {
@@ -227,7 +228,7 @@ fn paths_that_are_refused_leave_no_empty_figure_or_table() {
     }
 }
 
-/// The judge of pages sees what it is there for.
+/// The check of pages detects errors.
 #[test]
 fn a_page_with_an_empty_figure_or_an_error_is_seen() {
     let (count, empty) = figures(
@@ -273,7 +274,7 @@ fn a_spec_that_is_refused_gives_a_page_that_says_why() {
     assert_eq!(folder.listing(), before);
 }
 
-/// A recorded run, which here is a simulated one: the simulation of its commands gives the same errors.
+/// A recorded run, here from a simulation: simulating its commands again gives the same errors.
 #[test]
 fn a_recorded_run_stands_beside_the_simulation_of_its_commands() {
     let folder = Folder::new();
@@ -299,13 +300,13 @@ fn a_recorded_run_stands_beside_the_simulation_of_its_commands() {
     );
     has_numbers(&page);
     is_drawn(&folder, "run.html", &document.value["result"]["figures"]);
-    // Of another spec.
+    // A recording of another spec.
     let refused = folder.json(&["report", "legs.toml", "--record", "run.rec", "-o", "other.html"]);
     assert!(refused.code == 1 && refused.error().contains("give the spec that the target was built from"));
     if support::length(true, false) {
         return support::skipped("only in the full run: records of six legs");
     }
-    // Of six legs; and without its first two blocks, in which the machine is armed, so that it begins in the middle of a run.
+    // A recording of six legs, and one without its first two blocks, in which the machine arms, so that it starts during a run.
     let run = folder.run(&["sim", "legs.toml", "--record", "legs.rec", "--seconds", "1.5"]);
     assert_eq!(run.code, 0, "{}", run.stderr);
     let whole = std::fs::read(folder.path("legs.rec")).unwrap();
@@ -325,7 +326,7 @@ fn a_recorded_run_stands_beside_the_simulation_of_its_commands() {
     }
 }
 
-/// The whole list but for a short search; away from the repository, for the specs are in the binary.
+/// All experiments with a short search, outside of the repository, because the specs are in the binary.
 #[test]
 #[ignore = "long: every experiment of the paper, twice; `paper_tables` holds its figures in the short run"]
 fn reproduce_gives_the_same_bytes_twice_and_every_table() {
@@ -357,7 +358,7 @@ fn reproduce_gives_the_same_bytes_twice_and_every_table() {
     }
     // 18 + 9, 8, 4 × 27, 10, 10.
     assert_eq!(rows, 18 + 9 + 8 + 4 * 27 + 10 + 10);
-    // What the project promises of Table 2 and of Fig. 29.
+    // The project's claims for Table 2 and Fig. 29.
     for line in csv.lines().filter(|line| line.starts_with("table-2,invhys")) {
         assert!(line.contains(",agrees,"), "{line}");
     }

@@ -1,4 +1,4 @@
-//! The output depends on the spec and its records, and on nothing else.
+//! The output depends only on the spec and its records.
 
 use crate::support;
 use std::collections::BTreeMap;
@@ -16,17 +16,17 @@ type Files = BTreeMap<String, Vec<u8>>;
 /// Both kinds of controller: task space, legs with their own gauges.
 const KINDS: [&str; 2] = ["reference.toml", "legs.toml"];
 
-/// In the short run of both kinds where each has a source of its own, else of one of them.
+/// In the short run, both kinds only if they have different sources, otherwise one.
 fn some(kind: usize) -> &'static [&'static str] {
     support::length(&KINDS[kind..][..1], &KINDS)
 }
 
-/// The workspace of a spec, made in the plainest way into `output`.
+/// Writes the workspace of a spec to `output` without further options.
 fn plain(folder: &Folder, spec: &str, output: &str) -> Files {
     made(folder.command().args([spec, "-o", output, "--no-build"]), &folder.path(output))
 }
 
-/// The same, made once for all tests.
+/// The same workspace, written once for all tests.
 fn baseline(spec: &'static str) -> Files {
     static MADE: Mutex<BTreeMap<&str, Files>> = Mutex::new(BTreeMap::new());
     let mut made = MADE.lock().unwrap_or_else(PoisonError::into_inner);
@@ -41,7 +41,7 @@ fn made(command: &mut Command, output: &Path) -> Files {
     files
 }
 
-/// The same bytes in every file, the first difference named.
+/// Asserts that all files are equal, and names the first difference.
 fn same(left: &Files, right: &Files) {
     assert_eq!(left.keys().collect::<Vec<_>>(), right.keys().collect::<Vec<_>>());
     for (path, bytes) in left {
@@ -67,7 +67,7 @@ fn two_runs_give_the_same_bytes_and_one_changed_constant_does_not() {
         assert_ne!(first["controller/src/defaults.rs"], other["controller/src/defaults.rs"]);
         assert_ne!(first["ir.json"], other["ir.json"]);
     }
-    // A record is as much a source as the spec: one digit in its last line.
+    // A record is also a source: one digit in its last line.
     let record = folder.read("records/reference-forc.csv");
     let (head, last) = record.trim_end().rsplit_once('\n').unwrap();
     folder.write("records/reference-forc.csv", format!("{head}\n{last}1\n"));
@@ -76,7 +76,7 @@ fn two_runs_give_the_same_bytes_and_one_changed_constant_does_not() {
     }
 }
 
-/// A table of poses is one too.
+/// A table of poses is also a source.
 #[test]
 fn a_table_of_poses_is_a_source() {
     let folder = Folder::new();
@@ -168,7 +168,7 @@ fn another_user_makes_the_same_bytes() {
     }
 }
 
-/// The committed controller is what the reference spec gives: else the rest would compare something stale.
+/// The committed controller is that of the reference spec; otherwise the other tests would compare a stale one.
 #[test]
 fn the_committed_controller_is_the_reference_output() {
     let files = baseline("reference.toml");
@@ -200,7 +200,7 @@ fn no_clock_path_user_or_host_reaches_the_output() {
         "reference.toml".to_owned(),
     ];
     traces.extend(std::env::var("HOME").ok().filter(|home| home.len() > 1));
-    // A host may be called anything; a short name could be a word of the text.
+    // A short host name could be a word of the text.
     let host = fs::read_to_string("/proc/sys/kernel/hostname").unwrap_or_default().trim().to_owned();
     if host.len() >= 6 {
         traces.push(host);
@@ -212,7 +212,7 @@ fn no_clock_path_user_or_host_reaches_the_output() {
         for trace in &traces {
             assert!(!text.contains(trace), "{path} holds `{trace}`");
         }
-        // As a number of its own: the digits may well occur in a constant or a digest.
+        // As a separate number, because the digits may occur in a constant or a digest.
         let mut words = text.split(|c: char| !(c.is_ascii_alphanumeric() || c == '.' || c == '_'));
         assert!(!words.any(|word| word == year.to_string()), "{path} holds the year {year}");
     }

@@ -1,4 +1,4 @@
-//! `specgen robust` as a user runs it: replay to the bit, threads, the gate, what it calls diverged, what it refuses.
+//! `specgen robust` as a user runs it: exact replay, threads, gates, divergence, refusals.
 
 use std::collections::BTreeSet;
 
@@ -29,11 +29,11 @@ fn a_machine_run_alone_gives_the_same_bits() {
             arguments.extend(["--replay", name]);
             let alone = folder.json(&arguments).value;
             assert_eq!(alone["result"]["runs"].as_array().unwrap().len(), 1);
-            // Numbers of JSON are the shortest that name the double: equal texts are equal bits.
+            // JSON has the shortest decimal of each double, so equal texts mean equal bits.
             assert_eq!(machine(&alone["result"], name).to_string(), machine(report, name).to_string(), "{spec} {name}");
         }
         assert_ne!(drawn[0]["outcome"], drawn[1]["outcome"], "the comparison can fail");
-        // The command that is printed for the worst case is that machine's.
+        // The printed command for the worst case runs that machine.
         let rows = report["table"].as_array().unwrap().iter();
         let worst: BTreeSet<[&str; 2]> =
             rows.map(|row| ["replay", "name"].map(|key| row["worst"][key].as_str().unwrap())).collect();
@@ -95,14 +95,14 @@ fn a_leg_that_is_short_of_voltage_is_said_to_be_at_its_limit() {
     assert!(run.stdout.contains(", a leg at its limit in "), "{}", run.stdout);
 }
 
-/// Two ways to one figure: the nominal machine here, and the spec's own row of `tune`.
+/// The nominal machine here and the spec's own row of `tune` have the same figure.
 #[test]
 fn nominal_legs_have_the_error_that_tune_scores() {
     let folder = Folder::new();
     let tuned = folder.json(&["tune", "legs.toml", "--evaluations", "8", "--seconds", "0.1"]).value;
     let rows = tuned["result"]["settings"].as_array().unwrap();
     let scored = rows.iter().find(|row| row["name"] == "spec").unwrap()["scored_on"]["Scored"].clone();
-    // Tune scores on the seed after its own.
+    // `tune` scores with the next seed.
     let here = folder.json(&["robust", "legs.toml", "--seed", "2", "--replay", "nominal"]).value;
     let ran = &machine(&here["result"], "nominal")["outcome"]["ran"];
     let (expected, found) = (scored["error_nm"].as_f64().unwrap(), ran["error_nm"].as_f64().unwrap());
@@ -124,7 +124,7 @@ fn the_gate_of_options_or_spec_fails_a_build_with_the_reason_and_the_figures() {
     assert_eq!(passed.code, 0, "{passed:#?}");
     assert!(passed.stdout.contains("gate: passed (none diverged, largest rms error at most 1000.00 nm)"));
 
-    // For programs the figures come along.
+    // As JSON, with the figures.
     let judged = with(&["--max-error", "1 nm", "--json"]);
     let document: Value = serde_json::from_str(&judged.stdout).unwrap();
     assert_eq!((judged.code, document["exit_code"].as_u64()), (1, Some(1)));
@@ -132,7 +132,7 @@ fn the_gate_of_options_or_spec_fails_a_build_with_the_reason_and_the_figures() {
     assert_eq!(document["result"]["gate"]["reasons"].as_array().unwrap().len(), 1);
     assert!(document["result"]["runs"].as_array().unwrap().len() > 3);
 
-    // The spec's own gate and ranges; an option goes before.
+    // The spec's own gate and ranges; an option takes precedence.
     let text = folder.read("legs.toml");
     folder.write("legs.toml", format!("{text}\n[robust]\ngain = [0.99, 1.01]\nmax_error = \"1 nm\"\n"));
     let own = folder.run(&few[..6]);
@@ -181,7 +181,7 @@ fn what_cannot_be_run_is_refused_with_a_fix_and_nothing_is_written() {
     }
 }
 
-/// A part of the study; its file.
+/// Runs a part of the study; returns its file.
 fn part(folder: &Folder, index: u32, of: u32) -> String {
     let (shard, file) = (format!("{index}/{of}"), format!("part-{index}-{of}.json"));
     let run = folder.run(&[&STUDY[..], &["--threads", "1", "--shard", &shard, "-o", &file]].concat());
@@ -209,7 +209,7 @@ fn merged_parts_are_the_single_run_byte_for_byte() {
     for of in length(&[2][..], &[1, 4, 7, 40]) {
         let mut names = parts(&folder, *of);
         names.reverse();
-        // One was run again, elsewhere.
+        // One part was run again, on another computer.
         folder.write("again.json", folder.read(&names[0]));
         names.push("again.json".to_owned());
         let names: Vec<&str> = names.iter().map(String::as_str).collect();
@@ -251,7 +251,7 @@ fn parts_that_do_not_fit_are_refused_by_name() {
     with("specgen robust part", "specgen report", "was not written by specgen robust --shard");
     let version = format!("\"specgen\": \"{}\"", env!("CARGO_PKG_VERSION"));
     with(&version, "\"specgen\": \"0.0.1\"", "`other.json` was written by specgen \"0.0.1\"");
-    // What was cut off, or counts in other parts.
+    // A truncated part, or one of another number of parts.
     folder.write("other.json", &text[..text.len() / 2]);
     refused(&[one, "other.json", three], 1, "`other.json` is not JSON");
     refused(&[one, &part(&folder, 2, 2), three], 1, "is part 2 of 2, but `part-1-3.json` is one of 3");
@@ -276,7 +276,7 @@ fn parts_that_do_not_fit_are_refused_by_name() {
     }
 }
 
-/// A part is whole or not there.
+/// A part is complete or missing.
 #[cfg(unix)]
 #[test]
 #[ignore = "long: a shard that is killed"]
@@ -296,7 +296,7 @@ fn a_killed_shard_leaves_nothing_and_is_run_again() {
     }
 }
 
-/// An interrupt as the terminal sends it.
+/// An interrupt as from the terminal.
 #[cfg(unix)]
 #[test]
 fn ctrl_c_keeps_what_was_run_and_says_so() {
@@ -314,7 +314,7 @@ fn ctrl_c_keeps_what_was_run_and_says_so() {
     assert!(shown.contains("worst error") && !shown.contains("gate: passed"), "{shown}");
 }
 
-/// Machines learn, a gate judges what is left, and parts of such a study are the single run.
+/// Machines learn, a gate checks the remaining error, and merged parts equal the single run.
 #[test]
 #[ignore = "long: learning on machines of a study"]
 fn learned_errors_have_a_row_a_gate_and_parts() {
@@ -339,7 +339,7 @@ fn learned_errors_have_a_row_a_gate_and_parts() {
     assert_eq!(single.code, 1, "{single:#?}");
     assert!(single.stderr.contains("largest rms learned error is"), "{single:#?}");
     assert!(single.stdout.contains("learned, nm rms"));
-    // What is learned was measured over a time of its own.
+    // The learned error is measured over a different time.
     let over = |line: &str| {
         let line = single.stdout.lines().find(|one| one.starts_with(line)).unwrap();
         line.split_once("measured over ").unwrap().1.to_owned()
@@ -357,7 +357,7 @@ fn learned_errors_have_a_row_a_gate_and_parts() {
         let [before, after] = [&ran["error_nm"], &ran["learned"]["error_nm"]].map(|nm| nm.as_f64().unwrap());
         assert!(after < 0.6 * before, "{one}");
     }
-    // Parts are merged as those of any study, which short tests show.
+    // Parts are merged like those of any study, which shorter tests cover.
     if length(false, true) {
         for index in ["1/2", "2/2"] {
             let part = run(&["--shard", index, "-o", &format!("part-{}.json", &index[..1])]);
@@ -367,11 +367,11 @@ fn learned_errors_have_a_row_a_gate_and_parts() {
         assert_eq!((merged.code, &merged.stdout), (1, &single.stdout));
         assert_eq!(contents(&folder.path("merged")), contents(&folder.path("single")));
     }
-    // The option goes before the spec, whose limit is none where nothing is learned.
+    // The option takes precedence over the spec, whose limit does not apply without learning.
     run(&["--replay", "gain-low", "--max-learned", "1 um"]).says(0, &[]);
     let without: Vec<&str> = study.iter().copied().filter(|word| !["--learn", "2"].contains(word)).collect();
     folder.run(&[&without[..], &["--replay", "gain-low"]].concat()).says(0, &[]);
-    // A spec without a correction has nothing to learn with; a limit needs something learned.
+    // Learning needs a spec with a correction; its limit needs learning.
     folder
         .run(&["robust", "reference.toml", "--learn", "2"])
         .says(1, &["write correction = \"<number> um\" in [control], at most 6 um"]);

@@ -1,6 +1,6 @@
-//! The real-time target as a user runs it: the emitted workspace built, its binary in closed loop with `specgen plant`, asked over
-//! the link, its records replayed by the host library. Nothing here asserts times: only that every tick is accounted for,
-//! and bits.
+//! The real-time target as a user runs it: builds the emitted workspace, runs its binary in closed loop with `specgen plant`, operates
+//! it over the link, and replays its records with the host library. The tests assert bits, and that every tick is accounted for, but
+//! no times.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // Helpers of tests, where a panic is a failed test.
 #![cfg(target_os = "linux")]
@@ -35,24 +35,24 @@ mod stops;
 mod wiring;
 use host::{Host, Record};
 
-/// Length of the platform's run, s, where another than that of CI is wanted.
+/// Length of the platform's run, s, if not that of CI.
 const SECONDS: &str = "SPECGEN_RT_SECONDS";
 
-/// Phases of the supervisor, and its causes of a silent link.
+/// Phases of the supervisor, and its cause of a silent link.
 const DISARMED: u8 = 0;
 const RUNNING: u8 = 2;
 const HOLDING: u8 = 3;
 const FAULTED: u8 = 5;
 const LINK_LOST: u8 = 9;
 const HOST_GONE: u8 = 13;
-/// Requests to it.
+/// Requests to the supervisor.
 const NONE: u8 = 0;
 const ARM: u8 = 1;
 const RUN: u8 = 2;
 const HOLD: u8 = 3;
 const RAMP_DOWN: u8 = 4;
 const ACKNOWLEDGE: u8 = 5;
-/// Bit of a platform's status: it goes to its bias pose, or plays.
+/// Status bit of a platform: a motion is in progress.
 const BUSY: u32 = 1 << 18;
 
 /// The real-time program and the host library of a spec.
@@ -62,10 +62,10 @@ struct Programs {
 }
 
 impl Programs {
-    /// Of a spec: built once, for most tests take the same.
+    /// The programs of a spec, built once, because most tests use the same.
     fn of(spec: &Path) -> Arc<Self> {
-        // Cargo's folder is kept between runs and shared by all specs, so that dependencies are compiled once; the programs are
-        // called alike.
+        // Cargo's folder is kept between runs and shared by all specs, so that dependencies are compiled once. The programs have the same
+        // name.
         static BUILT: Mutex<BTreeMap<PathBuf, Arc<Programs>>> = Mutex::new(BTreeMap::new());
         let mut built = BUILT.lock().unwrap_or_else(PoisonError::into_inner);
         built.entry(spec.to_owned()).or_insert_with(|| Arc::new(Self::built(spec))).clone()
@@ -84,7 +84,7 @@ impl Programs {
     }
 }
 
-/// Has cargo build or test the program of a workspace; its target folder, which all share.
+/// Builds or tests the program of a workspace with cargo. Returns the shared target folder.
 fn cargo(workspace: &Path, verb: &str) -> PathBuf {
     let kept = Path::new(env!("CARGO_TARGET_TMPDIR")).join("rt-pc");
     let mut command = Command::new("cargo");
@@ -93,7 +93,7 @@ fn cargo(workspace: &Path, verb: &str) -> PathBuf {
     for leak in ["RUSTFLAGS", "CARGO_ENCODED_RUSTFLAGS", "CARGO_BUILD_TARGET", "CARGO_TARGET_DIR"] {
         command.env_remove(leak);
     }
-    // Fat link-time optimisation costs the test more than all the rest.
+    // Fat link-time optimisation would take longer than everything else.
     command.env("CARGO_PROFILE_RELEASE_LTO", "off").env("CARGO_PROFILE_RELEASE_CODEGEN_UNITS", "16");
     command.env("CARGO_PROFILE_RELEASE_DEBUG", "0");
     let output = command.output().unwrap();
@@ -102,8 +102,8 @@ fn cargo(workspace: &Path, verb: &str) -> PathBuf {
     kept
 }
 
-/// The workspace of a spec, at one place for all: cargo names crates by their place, and compiles those anew whose files became others.
-/// No other spec's is put there while the second lives.
+/// The workspace of a spec, at the same path for all specs, so that cargo recompiles only crates with changed files. While the guard
+/// lives, no other spec is written there.
 fn staged(spec: &Path) -> (PathBuf, MutexGuard<'static, ()>) {
     static ONE: Mutex<()> = Mutex::new(());
     let one = ONE.lock().unwrap_or_else(PoisonError::into_inner);
@@ -133,7 +133,7 @@ fn staged(spec: &Path) -> (PathBuf, MutexGuard<'static, ()>) {
     (root, one)
 }
 
-/// Of the reference alone: some of them ask for what other specs do not have.
+/// Only for the reference: some of these tests need features that other specs lack.
 #[test]
 #[ignore = "long: the program compiled once more"]
 fn the_tests_of_the_program_itself_pass() {
@@ -141,7 +141,7 @@ fn the_tests_of_the_program_itself_pass() {
     cargo(&root, "test");
 }
 
-/// Programs of a spec and a running machine, with a folder of their own.
+/// Programs of a spec and a running machine, with a separate folder.
 struct Bench {
     programs: Arc<Programs>,
     folder: tempfile::TempDir,
@@ -151,12 +151,12 @@ struct Bench {
 }
 
 impl Bench {
-    /// Of a spec of this repository.
+    /// For a spec of this repository.
     fn new(spec: &str) -> Self {
         Self::of(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../../specs").join(spec))
     }
 
-    /// Of a spec of this repository, its machine under a name of its own.
+    /// For a spec of this repository, with a name for its machine.
     fn named(spec: &str, name: &str) -> Self {
         Self::with(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../../specs").join(spec), name)
     }
@@ -169,7 +169,7 @@ impl Bench {
     fn with(spec: &Path, name: &str) -> Self {
         let programs = Programs::of(spec);
         let name = format!("test-{name}-{}", std::process::id());
-        // Under real-time priority where that is granted: other tests want the processors too.
+        // With real-time priority if permitted, because other tests use the processors, too.
         let plant = |more: &[&str]| {
             let mut command = Command::new(env!("CARGO_BIN_EXE_specgen"));
             command.args(["plant", spec.to_str().unwrap(), "--name", &name]).args(more);
@@ -188,7 +188,7 @@ impl Bench {
 
     /// The binary on the simulated machine, recording to `record`.
     fn command(&self, record: &str) -> Command {
-        // Whatever the umask, nobody else may connect.
+        // With any umask, nobody else may connect.
         let mut command = Command::new("sh");
         command.args(["-c", "umask 0; exec \"$@\"", "sh"]).arg(&self.programs.binary);
         command.args(["--sim", &self.name, "--allow-no-rt", "--json", "--record"]).arg(self.path(record));
@@ -200,7 +200,7 @@ impl Bench {
         Supervised::new(Controller::load(&self.programs.library).unwrap())
     }
 
-    /// Checks what holds of every run, whatever the machine did and however loaded this computer is.
+    /// Checks what holds for every run, independent of the machine's motion and the load of this computer.
     fn check(&self, output: &Output, record: &str) -> (Value, Record) {
         let text = String::from_utf8_lossy(&output.stdout);
         let summary: Value = serde_json::from_str(&text).unwrap_or_else(|error| {
@@ -215,7 +215,7 @@ impl Bench {
         assert_eq!((count("allocations"), count("waiting_ticks"), count("lost_rows")), (0, 0, 0), "{text}");
         let record = Record::new(fs::read(self.path(record)).unwrap());
         assert_eq!(record.rows.len() as u64, count("on_time") + count("late"), "a row for every tick that was run");
-        // A tick after skipped ones says so, and no other.
+        // Only a tick after skipped ones reports them.
         let events = record.place("events");
         let missed = record.rows.iter().filter(|row| row.input[events] & 1 == 1).count() as u64;
         assert!(missed <= count("skipped") && (missed > 0) == (count("skipped") > 0), "{missed}: {text}");
@@ -224,7 +224,7 @@ impl Bench {
         (summary, record)
     }
 
-    /// As a user does it.
+    /// Replays a record with the command.
     fn replay(&self, record: &str) -> Output {
         let mut command = Command::new(env!("CARGO_BIN_EXE_specgen"));
         command.arg("replay").arg(self.path(record)).arg("--spec").arg(&self.spec).output().unwrap()
@@ -242,7 +242,7 @@ impl Drop for Bench {
 fn wait_for(what: &str, mut there: impl FnMut() -> bool) {
     let start = Instant::now();
     while !there() {
-        assert!(start.elapsed() < Duration::from_secs(60), "{what} does not come");
+        assert!(start.elapsed() < Duration::from_secs(60), "{what} does not appear");
         std::thread::sleep(Duration::from_millis(5));
     }
 }
@@ -251,33 +251,33 @@ fn signal(process: &Child, name: Signal) {
     crate::support::send(name, process.id());
 }
 
-/// A run that goes on until it is asked to end, or until the test fails.
-struct Running(Option<Child>);
+/// A process that runs until it is asked to end, or until the test fails.
+struct ProcessGuard(Option<Child>);
 
-impl Running {
+impl ProcessGuard {
     fn new(command: &mut Command) -> Self {
         Self(Some(command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap()))
     }
 
-    /// Whether it has not ended by itself.
+    /// Whether it is still running.
     fn goes_on(&mut self) -> bool {
         self.0.as_mut().unwrap().try_wait().unwrap().is_none()
     }
 
-    /// Sends it a signal and waits for its end.
+    /// Sends a signal and waits for the end.
     fn end(mut self, name: Signal) -> Output {
         assert!(self.goes_on(), "it runs until it is asked to end");
         signal(self.0.as_ref().unwrap(), name);
         self.wait()
     }
 
-    /// Waits for its end.
+    /// Waits for the end.
     fn wait(mut self) -> Output {
         self.0.take().unwrap().wait_with_output().unwrap()
     }
 }
 
-impl Drop for Running {
+impl Drop for ProcessGuard {
     fn drop(&mut self) {
         if let Some(running) = &mut self.0 {
             let _ = running.kill();
@@ -294,13 +294,13 @@ fn a_platform_runs_its_trajectory_in_closed_loop_and_its_record_replays_to_the_b
     let output =
         bench.command("a.rec").args(["--seconds", &seconds.to_string(), "--set", "command=3"]).output().unwrap();
     let (summary, record) = bench.check(&output, "a.rec");
-    // At 10 kHz; the ramp down comes after.
+    // At 10 kHz; the ramp-down follows.
     assert!(summary["planned"].as_f64().unwrap() > 1e4 * (seconds - 0.1), "{summary}");
     println!("{summary:#}");
     println!("{} ticks replayed on the host, outputs and digests equal to the bit", record.rows.len());
     assert_eq!(output.status.code(), Some(i32::from(!summary["failure"].is_null())), "{summary}");
 
-    // One bit in one word is noticed.
+    // One changed bit is detected.
     let good = bench.replay("a.rec");
     assert!(good.status.success() && String::from_utf8_lossy(&good.stdout).contains("bit-equal"), "{good:?}");
     fs::write(bench.path("flipped.rec"), record.flipped()).unwrap();
@@ -325,20 +325,20 @@ fn a_platform_runs_its_trajectory_in_closed_loop_and_its_record_replays_to_the_b
     card::shared_memory_that_becomes_shorter_ends_nobody(bench);
 }
 
-/// With time that waits, so that it runs on any computer.
+/// With elastic time, so that it runs on any computer.
 fn a_host_arms_it_over_the_link_makes_a_wave_and_is_missed(bench: &Bench) {
     let link = bench.path("link");
     let mut command = bench.command("b.rec");
     command.args(["--elastic", "--sim-timeout", "5000", "--link-silence", "1000", "--link"]).arg(&link);
     command.arg("--capture").arg(bench.path("capture.rec"));
-    let running = Running::new(&mut command);
+    let running = ProcessGuard::new(&mut command);
     wait_for("the link", || link.exists());
     assert_eq!(fs::metadata(&link).unwrap().permissions().mode() & 0o777, 0o600);
 
     let mut host = Host::open(&link, 1).unwrap();
     let machine = bench.machine();
     let description = host.fetch(|offset| Request::Describe { offset });
-    // The host library adds sizes of its own to it.
+    // The host library adds its own sizes to it.
     assert!(machine.controller().text().as_bytes().starts_with(&description) && description.len() > 100);
     host.wait("a tick", |status| status.tick > 0 && status.phase == DISARMED);
     for request in [Request::LockstepReset { config: Bytes(&[]) }, Request::LockstepStage { index: 0 }] {
@@ -350,7 +350,7 @@ fn a_host_arms_it_over_the_link_makes_a_wave_and_is_missed(bench: &Bench) {
 
     host.done(&Request::Supervise { request: ARM });
     host.wait("armed", |status| status.phase == HOLDING);
-    // Others may look and slow it down, but the orders are the host's.
+    // Others may query and request a hold, but only this host is in control.
     let mut other = Host::open(&link, 2).unwrap();
     assert_eq!(other.refused(&Request::Supervise { request: RUN }), Refusal::Busy);
     assert_eq!(other.refused(&Request::Setpoint { words: Bytes(&command) }), Refusal::Busy);
@@ -358,7 +358,7 @@ fn a_host_arms_it_over_the_link_makes_a_wave_and_is_missed(bench: &Bench) {
     host.done(&Request::Supervise { request: RUN });
     host.wait("at its bias pose", |status| status.phase == RUNNING && status.status & BUSY == 0);
 
-    // Other settings, all at once or not at all.
+    // Settings are replaced all at once or not at all.
     let mut config = host.config();
     assert_eq!(config, machine.controller().default_config());
     let bytes = |words: &[u64]| words.iter().flat_map(|word| word.to_le_bytes()).collect::<Vec<u8>>();
@@ -390,7 +390,7 @@ fn a_host_arms_it_over_the_link_makes_a_wave_and_is_missed(bench: &Bench) {
     let tick = host.status().tick;
     host.wait("the wave", |status| status.tick > tick + 1000);
 
-    // What the recorder has kept since power-up, as the file that it writes.
+    // The record since power-up equals the file that it writes.
     assert_eq!(host.refused(&Request::Download { offset: 0 }), Refusal::State, "it records");
     let standing = host.recorder(RecorderAction::Look);
     assert!(standing.running && !standing.triggered && standing.ticks > 1000, "{standing:?}");
@@ -409,18 +409,18 @@ fn a_host_arms_it_over_the_link_makes_a_wave_and_is_missed(bench: &Bench) {
     assert_eq!((&replay.divergence, replay.triggers.len(), replay.ticks), (&None, 1, u64::from(standing.ticks)));
     host.recorder(RecorderAction::Arm { after: 1 });
 
-    // Set-points are taken again once the wave is over.
+    // Set-points are accepted again after the wave.
     host.wait("the end of the wave", |status| status.tick > tick + 6000);
     host.done(&Request::Setpoint { words: Bytes(&command) });
 
-    // What is no frame is counted, however long; a host that is killed is missed, and then another has the orders.
+    // Invalid frames are counted, however long. A killed host is lost, and then another can take control.
     host.line().write_all(&[1, 2, 3, 0, 255, 255, 0]).unwrap();
     host.line().write_all(&[&[7; 5000][..], &[0]].concat()).unwrap();
     assert!(host.status().link.errors() >= 3);
     drop(host);
     other.wait("the loss", |status| (status.phase, status.cause) == (HOLDING, LINK_LOST));
     other.done(&Request::Supervise { request: RAMP_DOWN });
-    // For a cause it ends faulted, until that is acknowledged.
+    // With a cause it ends in the faulted phase, until that is acknowledged.
     other.wait("the way down", |status| {
         (status.phase, status.cause, status.amplifier_on) == (FAULTED, LINK_LOST, false)
     });
@@ -443,7 +443,7 @@ fn a_host_arms_it_over_the_link_makes_a_wave_and_is_missed(bench: &Bench) {
     assert!(record.rows.iter().any(|row| row.supervisor >> 8 & 0xff == u32::from(LINK_LOST)));
 }
 
-/// What a file may be long is limited, as on a full disk.
+/// A limit on file sizes acts like a full disk.
 fn a_record_that_finds_no_room_brings_the_machine_down(bench: &Bench) {
     let script = "ulimit -f 800; trap '' XFSZ; exec \"$@\"";
     let mut command = Command::new("sh");
@@ -473,7 +473,7 @@ fn a_record_that_finds_no_room_brings_the_machine_down(bench: &Bench) {
 /// Outputs of two cards.
 const TWO_CARDS: [&str; 4] = ["--comedi-out", "/dev/fake1", "--comedi-out", "/dev/fake2"];
 
-/// A library of cards that stand still; built once for a bench.
+/// A library of cards with constant inputs; built once for a bench.
 fn fake_comedi(bench: &Bench) -> PathBuf {
     let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/rt_pc/fake_comedi.rs");
     let library = bench.path("libcomedi.so");
@@ -487,7 +487,7 @@ fn fake_comedi(bench: &Bench) -> PathBuf {
     library
 }
 
-/// A short run on them, whatever the spec assumes.
+/// A short run on the cards, with assumed values accepted.
 fn on_card(bench: &Bench, library: &Path, variables: &[(&str, &str)], arguments: &[&str]) -> Output {
     on_card_as_it_is(bench, library, variables, &[&["--assumed-ok"], arguments].concat())
 }
@@ -499,11 +499,11 @@ fn on_card_as_it_is(bench: &Bench, library: &Path, variables: &[(&str, &str)], a
     command.env("FAKE_LOG", bench.path("card.log")).envs(variables.iter().copied()).output().unwrap()
 }
 
-/// The same binary on a library that stands in for comedilib.
+/// The same binary with a fake comedilib.
 fn a_card_is_read_driven_and_switched_off(bench: &Bench) {
     let library = fake_comedi(bench);
     let run = |variables: &[(&str, &str)], arguments: &[&str]| on_card(bench, &library, variables, arguments);
-    // Whether the amplifiers were ever to be on.
+    // Whether the amplifiers were ever requested on.
     let was_on = |record: &Record| record.rows.iter().any(|row| row.supervisor >> 16 & 1 == 1);
     let log = || {
         let text = fs::read_to_string(bench.path("card.log")).unwrap();
@@ -513,7 +513,7 @@ fn a_card_is_read_driven_and_switched_off(bench: &Bench) {
         (numbers, field("line="), field("directions=") == "0:1,2:0,3:0,1:1" && field("bad=").is_empty())
     };
 
-    // The spec names what it assumes, and its record is simulated: no card is opened.
+    // The spec has assumed values and a simulated record, so no card is opened.
     let unasked = on_card_as_it_is(bench, &library, &[], &TWO_CARDS);
     let text = String::from_utf8_lossy(&unasked.stderr);
     let named = ["actuator.axial_stiffness", "records/reference-forc.csv (simulated)", "--assumed-ok"];
@@ -531,7 +531,7 @@ fn a_card_is_read_driven_and_switched_off(bench: &Bench) {
     assert!(text.contains(&format!("\nbeats={ticks}\n")), "a beat a tick: {ticks}, {text}");
     assert!(line.starts_with('0') && line.ends_with('0') && line.contains('1') == was_on(&record), "{line}");
 
-    // A card that fails in the middle: counted, seen by the supervisor, off at the end.
+    // A card that fails during the run: counted, detected by the supervisor, off at the end.
     let (summary, record) = bench.check(&run(&[("FAKE_FAIL_AFTER", "600")], &two), "card.rec");
     let (events, ticks) = (record.place("events"), record.rows.len());
     let broken = record.rows.iter().filter(|row| row.input[events] & 8 != 0).count();
@@ -559,13 +559,13 @@ fn legs_are_moved_by_operate_and_a_machine_that_is_killed_is_a_converter_that_do
     let link = bench.path("link");
     let mut command = bench.command("legs.rec");
     command.args(["--elastic", "--sim-timeout", "1000", "--link"]).arg(&link);
-    let running = Running::new(&mut command);
+    let running = ProcessGuard::new(&mut command);
     wait_for("the link", || link.exists());
     let mut watcher = Host::open(&link, 1).unwrap();
     watcher.wait("a tick", |status| status.tick > 0 && status.phase == DISARMED);
     let mut command = Command::new(env!("CARGO_BIN_EXE_specgen"));
     command.arg("operate").arg("--socket").arg(&link).arg(&bench.spec).stdin(Stdio::piped());
-    let mut operate = Running::new(&mut command);
+    let mut operate = ProcessGuard::new(&mut command);
     let mut input = operate.0.as_mut().unwrap().stdin.take().unwrap();
     input.write_all(b"set request=1\nfly\narm\nwait arming\nrun\nwait running\nset setpoint[2]=2e-6\n").unwrap();
     let start = watcher.wait("running", |status| status.phase == RUNNING).tick;
@@ -573,12 +573,12 @@ fn legs_are_moved_by_operate_and_a_machine_that_is_killed_is_a_converter_that_do
 
     signal(&bench.plant, Signal::KILL);
     bench.plant.wait().unwrap();
-    // The first reading is waited for, the next ones are not.
+    // The program waits for the first reading only.
     std::thread::sleep(Duration::from_millis(1_000));
     let start = watcher.status().tick;
     watcher.wait("ticks without a machine", |status| status.tick > start + 100);
     let output = running.end(Signal::INT);
-    // It is found out that the program is gone.
+    // The end of the program is detected.
     let operated = operate.wait();
     let text = String::from_utf8_lossy(&operated.stdout);
     assert!(operated.status.code() == Some(3) && text.contains("`request` cannot be set"), "{operated:?}");

@@ -1,4 +1,4 @@
-//! The files of `docs/scale.md` for schedulers, run as these would run them: every one gives the bytes of the single run.
+//! Runs the scheduler files of `docs/scale.md`; each gives the bytes of the single run.
 
 use std::fs;
 use std::process::Command;
@@ -6,7 +6,7 @@ use std::process::Command;
 use crate::support::commands::{blocks, shell};
 use crate::support::{Folder, contents, repository, skipped};
 
-/// The block of the document that has `word`, for a study of seconds.
+/// The block of the document with `word`, changed to a study of seconds.
 fn block(word: &str) -> String {
     let text = fs::read_to_string(repository().join("docs/scale.md")).unwrap();
     let mut found = blocks(&text).into_iter().filter(|block| block.body.contains(word));

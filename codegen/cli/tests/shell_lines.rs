@@ -1,5 +1,5 @@
-//! Lines for a shell that the program prints. Each with a name in it is built by `specgen_language::shell` and run here with names that
-//! a careless line takes for something else; each without is run with programs that do nothing but say that they were called.
+//! Shell commands that the program prints. Those with a file name are built by `specgen_language::shell`, and run here with names that
+//! need quoting. Those without are run with stub programs that log their calls.
 
 mod forms;
 mod scan;
@@ -14,7 +14,7 @@ use crate::support::commands::Line;
 use crate::support::{BINARY, Folder, length, repository};
 use scan::{PROGRAMS, built, code, is_sentence, lines, literals, sources};
 
-/// Places where lines are built, and the test that runs them.
+/// Places where commands are built, and the test that runs them.
 const BUILT: &[(&str, usize, &str)] = &[
     ("codegen/studies/src/build.rs", 3, "next_commands_name_the_files_that_were_named"),
     ("codegen/studies/src/check.rs", 2, "next_commands_name_the_files_that_were_named"),
@@ -31,7 +31,7 @@ const BUILT: &[(&str, usize, &str)] = &[
     ("codegen/identify/src/coverage.rs", 1, "a_drive_is_written_beside_the_record"),
     ("codegen/language/src/spec/source.rs", 1, "specs_in_other_encodings_become_text_and_stay"),
 ];
-/// Texts with something in braces that begin as a line does.
+/// Texts with a placeholder that look like a command but are not.
 const NO_LINES: [&str; 10] = [
     "rustup cannot be run: {error}",
     "specgen {meant}",
@@ -86,7 +86,7 @@ fn every_line_with_a_name_in_it_is_built_in_one_place_and_run_by_a_test() {
     }
 }
 
-/// Programs that note how they were called, in place of all others but the shell's own.
+/// Stub programs that log their arguments; only the shell's built-ins are real.
 struct Stubs(tempfile::TempDir);
 
 impl Stubs {
@@ -100,7 +100,7 @@ impl Stubs {
         Self(folder)
     }
 
-    /// How the programs are called by `line`.
+    /// Calls of the programs by `line`.
     fn calls(&self, line: &str) -> Vec<Vec<String>> {
         let here = tempfile::tempdir().unwrap();
         let calls = self.0.path().join("calls");
@@ -120,7 +120,7 @@ impl Stubs {
     }
 }
 
-/// Lines without a name: a shell takes them, they write no file of the user, and those that call specgen are its own.
+/// Commands without a file name: a shell accepts them, they write no user file, and those of specgen exist.
 #[test]
 fn every_constant_line_is_one_that_a_shell_runs() {
     let stubs = Stubs::new();
@@ -155,7 +155,7 @@ fn every_constant_line_is_one_that_a_shell_runs() {
     assert!(count > 40, "{count}");
 }
 
-/// The lines between backticks that begin with `program` in what a command says.
+/// Texts between backticks in a command's output that start with `program`.
 fn printed(text: &str, program: &str) -> Vec<String> {
     let begins = |line: &&str| line.starts_with(&format!("{program} "));
     let quoted = text.split('`').skip(1).step_by(2).filter(begins).map(str::to_owned);
@@ -167,7 +167,7 @@ fn printed(text: &str, program: &str) -> Vec<String> {
     quoted.chain(alone).collect()
 }
 
-/// `arguments` with a file of any name.
+/// Runs a command with a file of any name.
 fn run(folder: &Folder, before: &[&str], name: &str, after: &[&str]) -> (i32, String) {
     let name = if name.starts_with('-') { format!("./{name}") } else { name.to_owned() };
     let output = folder.command().args(before).arg(name).args(after).output().unwrap();
@@ -175,7 +175,7 @@ fn run(folder: &Folder, before: &[&str], name: &str, after: &[&str]) -> (i32, St
     (output.status.code().unwrap(), text)
 }
 
-/// A shell in the folder in which `specgen` is the program under test, and Python has packages that do as much as the lines need.
+/// Runs a shell in the folder, with `specgen` as the program under test, and with minimal fake Python packages.
 fn shell(folder: &Folder, line: &str) -> Output {
     let programs = Path::new(BINARY).parent().unwrap();
     let path = format!("{}:{}", programs.display(), std::env::var("PATH").unwrap_or_default());
@@ -227,7 +227,7 @@ fn a_drive_is_written_beside_the_record() {
     assert_eq!(after, before);
 }
 
-/// Each line that comes next, called with the name as one word.
+/// Suggested next commands contain the name as one word.
 #[test]
 fn next_commands_name_the_files_that_were_named() {
     let stubs = Stubs::new();
@@ -239,7 +239,7 @@ fn next_commands_name_the_files_that_were_named() {
             let lines = printed(text, "specgen");
             assert!(lines.len() >= least, "{text}");
             for line in lines {
-                // What the help of a finding calls SPEC is any.
+                // SPEC in the help of a finding is a placeholder.
                 for call in stubs.calls(&line).into_iter().filter(|call| !call.contains(&"SPEC".to_owned())) {
                     let is_named = |word: &String| names.iter().any(|name| word.trim_start_matches("./") == *name);
                     assert!(call.iter().any(is_named), "`{line}`: {call:?}");
@@ -282,7 +282,7 @@ fn commands_of_a_page_name_its_spec() {
     }
 }
 
-/// Without the program that flashes, the lines by hand are shown.
+/// Without probe-rs, the manual commands are shown.
 #[test]
 fn a_line_for_a_programmer_names_the_image() {
     use specgen::shell::line;
@@ -294,7 +294,7 @@ fn a_line_for_a_programmer_names_the_image() {
     }
 }
 
-/// The options of a study are arguments, too.
+/// The options of a study are also arguments.
 #[test]
 fn a_machine_is_run_again_by_its_line() {
     let folder = Folder::new();

@@ -1,4 +1,4 @@
-//! `specgen tune` as a user runs it: the figure it reaches, the bytes it gives, what it refuses, what it writes.
+//! `specgen tune` as a user runs it: the resulting figure, reproducible bytes, refusals, written files.
 
 use crate::support;
 
@@ -36,7 +36,7 @@ fn a_leg_at_10_hz_is_within_12_nm_on_a_trajectory_and_a_seed_it_was_not_tuned_on
     assert!(tuned <= 12.0, "{tuned}");
     assert!(report["margins"]["gain"].as_f64().unwrap() >= 1.99, "{:#}", report["margins"]);
 
-    // Two values changed, everything else of the spec as it was; and it compiles.
+    // Two values changed, the rest of the spec unchanged; and it compiles.
     let (old, new) =
         (std::fs::read_to_string(support::repository().join("specs/legs.toml")).unwrap(), folder.read("legs.toml"));
     let changed: Vec<(&str, &str)> = old.lines().zip(new.lines()).filter(|(a, b)| a != b).collect();
@@ -73,7 +73,7 @@ fn the_same_seed_gives_the_same_bytes_whatever_the_number_of_threads() {
     }
 }
 
-/// k_p over the stiffness of its axis at which P on that axis alone is at its limit of stability.
+/// k_p relative to the stiffness of its axis at the stability limit of P on that axis alone.
 fn ultimate_gain(compiled: &Compilation, axis: usize) -> f64 {
     let model = &compiled.model;
     let rest = RestDynamics::of(&platform(model).unwrap());
@@ -102,7 +102,7 @@ fn tuned_gains_of_a_platform_hold_their_margins_and_are_those_that_the_spec_then
     assert_eq!(tuned["holds_margins"], true);
     for (on, start) in [("tuned_on", "spec"), ("tuned_on", "Ziegler-Nichols")] {
         let better = tuned[on]["Scored"]["cost"].as_f64().unwrap();
-        // Ziegler and Nichols may be without the margins, but never better under the paper's cost and unstable.
+        // Ziegler-Nichols gains may lack the margins, but must not score better under the paper's cost while unstable.
         assert!(
             row(report, start)["holds_margins"] == false
                 || better <= row(report, start)[on]["Scored"]["cost"].as_f64().unwrap()
@@ -111,8 +111,8 @@ fn tuned_gains_of_a_platform_hold_their_margins_and_are_those_that_the_spec_then
     assert!(report["margins"]["gain"].as_f64().is_none_or(|gain| gain >= 1.99));
     assert!(report["margins"]["delay_ticks"].as_f64().is_none_or(|ticks| ticks >= 0.49));
     assert!(report["margins"]["phase_degrees"].as_f64().unwrap() > 5.0);
-    // The relay against the analysis: k_p of one axis alone at which the sampled loop becomes unstable. The bare loop would
-    // give 0.1 K at the first mode, the one with the notch is an order of magnitude above.
+    // The relay compared with the analysis: k_p of one axis at which the sampled loop becomes unstable. The loop without notch would
+    // give 0.1 K at the first mode; with the notch it is an order of magnitude higher.
     let compiled = compile(&support::repository().join("specs/reference.toml")).unwrap();
     for (axis, found) in report["relay"].as_array().unwrap().iter().enumerate() {
         let (gain, hertz) = (found["gain"].as_f64().unwrap(), 1.0 / found["period"].as_f64().unwrap());
@@ -191,7 +191,7 @@ fn an_edit_made_while_it_is_tuned_is_not_lost() {
     assert_eq!(folder.read("legs.toml"), edited);
 }
 
-/// An interrupt as the terminal sends it.
+/// An interrupt as from the terminal.
 #[cfg(unix)]
 #[test]
 fn ctrl_c_keeps_the_best_so_far_and_says_so() {
@@ -204,7 +204,7 @@ fn ctrl_c_keeps_the_best_so_far_and_says_so() {
     assert!(run.stdout.contains("tuned") && run.stdout.contains("+++ legs.toml"), "{}", run.stdout);
 }
 
-/// Two ways to one figure: a candidate of a file, and the row of the spec in a search.
+/// A candidate in a file and the spec's row in a search have the same score.
 #[test]
 fn candidates_of_a_file_have_the_scores_of_the_search() {
     let folder = Folder::new();
@@ -231,7 +231,7 @@ fn candidates_of_a_file_have_the_scores_of_the_search() {
     assert_eq!((&candidates[2]["verdict"], &candidates[2]["cost"]), (&Value::from("Unstable"), &Value::Null));
     assert_ne!(candidates[3]["cost"], candidates[0]["cost"], "the comparison can fail");
     assert_eq!(score(&file, "1"), found);
-    // What there is to propose.
+    // The available parameters.
     let names: Vec<Value> =
         score("[]", "1")["parameters"].as_array().unwrap().iter().map(|one| one["name"].clone()).collect();
     assert_eq!(names, ["level", "drift"]);

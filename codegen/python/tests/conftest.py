@@ -1,4 +1,4 @@
-"""What every test needs."""
+"""Common fixtures."""
 
 import json
 import os
@@ -13,12 +13,12 @@ import specgen
 REPOSITORY = Path(__file__).parents[3]
 REFERENCE = REPOSITORY / "specs/reference.toml"
 LEGS = REPOSITORY / "specs/legs.toml"
-# `cargo xtask wheel` says where it is.
+# `cargo xtask wheel` sets it.
 COMMAND = os.environ.get("SPECGEN_COMMAND", str(REPOSITORY / "target/release/specgen"))
 
 
 def command(*arguments: object) -> Any:
-    """The document of the command, run as its users run it."""
+    """The document of the command-line program."""
     line = [COMMAND, *map(str, arguments), "--json"]
     return json.loads(subprocess.run(line, stdout=subprocess.PIPE, check=False).stdout)
 

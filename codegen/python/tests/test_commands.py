@@ -1,4 +1,4 @@
-"""Functions give what the commands give."""
+"""Functions give the results of the commands."""
 
 import subprocess
 import sys
@@ -59,7 +59,7 @@ def test_the_first_simulation_is_that_of_the_command() -> None:
     assert ours.data == theirs
     assert ours["digest"] == specgen.compile(REFERENCE).digest
     assert "playing case-1 on board" in lines
-    # A comparison that can fail.
+    # The comparison is able to fail.
     assert specgen.simulate(REFERENCE, frequency=10, seed=2).data != theirs
 
 

@@ -12,7 +12,7 @@ import specgen
 
 
 def rows(law: specgen.Controller, count: int) -> NDArray[np.void]:
-    """Gauges that wander, and set-points that are streamed."""
+    """Drifting gauges, and streamed set-points."""
     made = np.zeros(count, law.inputs)
     random = np.random.default_rng(7)
     for name in ("gauge", "displacement"):
@@ -26,7 +26,7 @@ def test_it_says_what_it_is(library: Path) -> None:
     compiled = specgen.compile(REFERENCE)
     assert (law.name, law.digest, law.scalar_bits) == (compiled.name, compiled.digest, 64)
     assert law.inputs["gauge"].shape == (6,) and law.outputs["voltage"].shape == (6,)
-    # Every word has its 8 bytes, and whole numbers are no reals.
+    # Every word has 8 bytes, and integers are not reals.
     assert law.inputs.itemsize % 8 == 0 and law.outputs["dac_code"].base == np.uint64
     assert set(specgen.Controller(library, supervised=True).inputs.names or ()) - set(law.inputs.names or ()) == {
         "request",
@@ -43,7 +43,7 @@ def test_rows_at_once_are_ticks_one_by_one(library: Path) -> None:
         found = single.step(**{name: row[name] for name in names})
         assert found.tobytes() == expected.tobytes()
     assert single.state_digest == together.state_digest
-    # Another input is another state.
+    # Another input gives another state.
     single.step(gauge=np.full(6, 1e-7))
     together.step(gauge=np.full(6, np.nextafter(1e-7, 1)))
     assert single.state_digest != together.state_digest
@@ -67,7 +67,7 @@ def test_what_is_not_built_has_the_bits_of_the_library(library: Path, supervised
         given["gauge"] *= 3
     assert made.run(given).tobytes() == emitted.run(given).tobytes()
     assert made.state_digest == emitted.state_digest
-    # A comparison that can fail.
+    # The comparison is able to fail.
     given["gauge"][-1] = np.nextafter(given["gauge"][-1], 1)
     made.reset()
     made.run(given)

@@ -1,4 +1,4 @@
-"""What docs/python.md shows runs as it stands there."""
+"""The examples of docs/python.md run unchanged."""
 
 import os
 import re

@@ -1,4 +1,4 @@
-"""Ctrl-C, and what is there without a toolchain."""
+"""Ctrl-C, and use without a toolchain."""
 
 import os
 import signal
@@ -18,7 +18,7 @@ def said(line): print(line, flush=True)
 
 
 def interrupted(body: str, when: str, after: float = 0.0) -> tuple[float, str, int]:
-    """Seconds from the signal to the end, output and exit code of a program that is interrupted when it has said `when`."""
+    """Seconds from the signal to the end, output and exit code of a program that is interrupted once it has printed `when`."""
     program = subprocess.Popen([sys.executable, "-c", HEAD + body], stdout=subprocess.PIPE, text=True, stderr=subprocess.STDOUT)
     assert program.stdout is not None
     text = ""

@@ -46,7 +46,7 @@ def link(program: Path, tmp_path: Path) -> Iterator[Path]:
 def waited(path: Path) -> None:
     begun = time.monotonic()
     while not path.exists():
-        assert time.monotonic() < begun + 30, f"{path} does not come"
+        assert time.monotonic() < begun + 30, f"{path} does not appear"
         time.sleep(0.05)
 
 
@@ -68,7 +68,7 @@ def test_a_machine_is_operated(link: Path, tmp_path: Path) -> None:
         machine.wait("arrived", 60)
         machine.move(x=0, y=0, z=5e-6, rx=0, ry=0, rz=0)
         machine.wait("arrived", 60)
-        # The session stays alive while nothing is asked.
+        # The session stays alive without commands.
         time.sleep(2)
         assert machine.status()["stands"] == "running"
         assert machine.jog(z="1 um", rx=1e-6)[2] == pytest.approx(6e-6)
@@ -110,7 +110,7 @@ def test_a_machine_is_operated(link: Path, tmp_path: Path) -> None:
         machine.status()
     again = specgen.replay(tmp_path / "run.rec", REFERENCE)
     assert again.passed and again["ticks"] > 100
-    # An exception brings it down.
+    # An exception ramps it down.
     with pytest.raises(LookupError), specgen.Machine(socket=link) as machine:
         machine.arm()
         machine.wait("arming", 60)

@@ -1,4 +1,4 @@
-"""CSV of the commands as arrays."""
+"""CSV files of commands as arrays."""
 
 import os
 from pathlib import Path

@@ -1,4 +1,4 @@
-//! What must not be in a tick, planted in one, and seen by name.
+//! Forbidden code planted in a tick is reported by name.
 
 use super::fixture::Workspace;
 use super::{build, tools};
@@ -64,7 +64,7 @@ fn every_planted_fault_is_named_with_its_function_and_its_line() {
 #[test]
 fn double_precision_in_a_tick_is_a_fault_where_the_core_has_none() {
     let Some(tools) = tools() else { return };
-    // The stand-in controller computes in f64.
+    // The dummy controller computes in f64.
     let workspace = Workspace::new(&tools, "", "-0.0");
     let m4f = build(&workspace, Mcu::Mps2An386);
     let checked = check(&m4f.elf, None, M4F).unwrap();
@@ -74,7 +74,7 @@ fn double_precision_in_a_tick_is_a_fault_where_the_core_has_none() {
         assert!(named.contains(operation), "{operation}: {named}");
     }
     assert!(named.contains("controller/src/lib.rs:"), "{named}");
-    // Asked of a core that computes f64 itself, the same image has no fault, and that core's own has none at all.
+    // For a core with an f64 FPU the same image has no fault, and neither has that core's own image.
     assert_eq!(check(&m4f.elf, None, M7).unwrap().faults, []);
     let m7 = build(&workspace, Mcu::Mps2An500);
     assert_eq!(check(&m7.elf, None, M4F).unwrap().faults, []);
@@ -97,7 +97,7 @@ fn every_byte_of_flash_has_one_owner() {
     let owner = |name: &str| found.owners.iter().find(|owner| owner.name == name).unwrap_or_else(|| panic!("{name}"));
     assert!(owner("controller").constants >= 12_000, "{found:#?}");
     assert!(owner("controller").code > 50 && owner("qemu").code > 500, "{found:#?}");
-    // A stand-in has no identity, and damaged files are refused.
+    // A dummy has no identity, and damaged files are refused.
     assert_eq!(found.identity, None);
     for length in (0..image.elf.len()).step_by(4999) {
         let _ = size::size(&image.elf[..length]);

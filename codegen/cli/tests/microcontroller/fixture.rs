@@ -1,5 +1,4 @@
-//! A tiny stand-in for an emitted workspace: the smallest controller that keeps the contract, with holes for
-//! what a test wants to plant in it.
+//! A dummy of an emitted workspace: the smallest controller that fulfils the interface, with placeholders for test code.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -11,13 +10,13 @@ use specgen::target::Tools;
 pub const INPUT_WORDS: usize = 12;
 pub const OUTPUT_WORDS: usize = 7;
 
-/// An emitted workspace in a folder that goes away with it.
+/// An emitted workspace in a temporary folder.
 pub struct Workspace {
     folder: tempfile::TempDir,
 }
 
 impl Workspace {
-    /// `items` stands beside `step`; `extra` is an expression of type `f64` over `input: &TickInput` that is
+    /// `items` is placed beside `step`; `extra` is an expression of type `f64` over `input: &TickInput` that is
     /// added to output 0.
     pub fn new(tools: &Tools, items: &str, extra: &str) -> Self {
         let folder = tempfile::tempdir().unwrap();
@@ -31,11 +30,11 @@ impl Workspace {
         let repository = Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(2).unwrap();
         copy(&repository.join("firmware/qemu"), &root.join("qemu"));
         copy(&repository.join("firmware/link"), &root.join("link"));
-        // The repository's stages measure parts that only an emitted controller has.
+        // The repository's stages measure parts that the dummy lacks.
         put(root, "qemu/src/stages.rs", STAGES);
         put(root, "qemu/src/machine.rs", MACHINE);
         put(root, "qemu/src/counted.rs", "//! The supervised tick, which the stand-in has not.\n");
-        // The committed lock names the real controller; only the path packages are put in its place.
+        // The committed lock file has the real controller; only its path packages are replaced.
         let status = Command::new(&tools.toolchain.cargo)
             .env("RUSTC", &tools.toolchain.rustc)
             .env_remove("LD_LIBRARY_PATH")
@@ -57,7 +56,7 @@ pub fn target_dir() -> PathBuf {
     Path::new(env!("CARGO_TARGET_TMPDIR")).join("images")
 }
 
-/// What the fixture's `step` computes, as the test's own arithmetic: six EWMA filters. Returns the output
+/// The result of the fixture's `step`, computed by the test: six EWMA filters. Returns the output
 /// words and the digest of each tick.
 pub fn expected(config: &[u64], inputs: &[Vec<u64>]) -> (Vec<Vec<u64>>, Vec<u64>) {
     let (gain, weight) = (f64::from_bits(config[0]), f64::from_bits(config[1]));

@@ -1,4 +1,4 @@
-//! A board at the other end of a pseudo-terminal: the device's side of the link as firmware has it, around the host library.
+//! A board at the other end of a pseudo-terminal: the firmware's side of the link with the host library.
 
 use std::fs::File;
 use std::io::{Read, Write};
@@ -16,8 +16,8 @@ use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 use specgen_link::lockstep::{Lockstep, Machine};
 use specgen_link::{CostUnit, Counters, Endpoint, Stage};
 
-/// A controller as a board steps it.
-pub struct Stepped {
+/// A controller stepped by a board.
+pub struct SteppedMachine {
     host: Supervised,
     text: String,
     ticks: u64,
@@ -25,13 +25,13 @@ pub struct Stepped {
     pub flip: Option<(u64, usize)>,
 }
 
-impl Stepped {
+impl SteppedMachine {
     pub fn new(host: Supervised) -> Self {
         let text = host.controller().description_text();
         Self { host, text, ticks: 0, flip: None }
     }
 
-    /// Says that it is the controller of another spec.
+    /// Makes it report another spec.
     pub fn pretend(mut self, digest: &str) -> Self {
         let own = format!("digest={}", self.host.controller().digest_text());
         self.text = self.text.replace(&own, &format!("digest={digest}"));
@@ -39,7 +39,7 @@ impl Stepped {
     }
 }
 
-/// What tests ask of a controller's description.
+/// Access to a controller's description.
 trait Text {
     fn description_text(&self) -> String;
     fn digest_text(&self) -> String;
@@ -55,7 +55,7 @@ impl<T: host_sim::controller::TickController> Text for T {
     }
 }
 
-impl Machine for Stepped {
+impl Machine for SteppedMachine {
     fn description(&self) -> &str {
         &self.text
     }
@@ -101,7 +101,7 @@ impl Machine for Stepped {
     }
 }
 
-/// The board, on a thread of its own. Dropped, it is unplugged.
+/// The board, in a separate thread. Dropping it unplugs the board.
 pub struct Board {
     pub port: PathBuf,
     unplugged: Arc<AtomicBool>,
@@ -109,8 +109,8 @@ pub struct Board {
 }
 
 impl Board {
-    /// Plugs it in. One byte in `noise` is flipped on its way, in either direction; 0 for none. `None` answers nothing.
-    pub fn plug(machine: Option<Stepped>, noise: u32) -> Self {
+    /// Plugs it in. One in `noise` bytes is corrupted in either direction, none if 0. Without a machine it does not answer.
+    pub fn plug(machine: Option<SteppedMachine>, noise: u32) -> Self {
         let line = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC).unwrap();
         grantpt(&line).unwrap();
         unlockpt(&line).unwrap();
@@ -121,7 +121,7 @@ impl Board {
         Self { port, unplugged, thread: Some(thread) }
     }
 
-    /// Unplugs it; what its endpoint has counted.
+    /// Unplugs it. Returns the counters of its endpoint.
     pub fn unplug(mut self) -> Counters {
         self.unplugged.store(true, Ordering::Relaxed);
         self.thread.take().unwrap().join().unwrap()
@@ -134,7 +134,7 @@ impl Drop for Board {
     }
 }
 
-fn serve(mut line: File, machine: Option<Stepped>, noise: u32, unplugged: &AtomicBool) -> Counters {
+fn serve(mut line: File, machine: Option<SteppedMachine>, noise: u32, unplugged: &AtomicBool) -> Counters {
     let mut random = ChaCha8Rng::seed_from_u64(3);
     let mut damage = |byte: u8| {
         let hit = noise > 0 && random.next_u32().is_multiple_of(noise);
@@ -146,7 +146,7 @@ fn serve(mut line: File, machine: Option<Stepped>, noise: u32, unplugged: &Atomi
     let limit = Timespec::try_from(Duration::from_millis(20)).unwrap();
     while !unplugged.load(Ordering::Relaxed) {
         let ready = poll(&mut [PollFd::new(&line, PollFlags::IN)], Some(&limit)).unwrap();
-        // Until someone opens the other end a read fails.
+        // Reads fail until the other end is opened.
         let count = if ready == 0 { 0 } else { line.read(&mut bytes).unwrap_or(0) };
         if count == 0 {
             std::thread::sleep(Duration::from_micros(200));

@@ -1,4 +1,4 @@
-//! What is left when a program is killed, what the contacts of a card do, and a machine whose memory is taken away.
+//! A killed program, contacts of a card, and a machine whose shared memory is truncated.
 
 use std::fs;
 use std::path::Path;
@@ -10,7 +10,8 @@ use specgen_link::Request;
 
 use super::host::{Host, Record};
 use super::{
-    ACKNOWLEDGE, ARM, Bench, DISARMED, FAULTED, HOLDING, NONE, RUN, RUNNING, Running, TWO_CARDS, fake_comedi, wait_for,
+    ACKNOWLEDGE, ARM, Bench, DISARMED, FAULTED, HOLDING, NONE, ProcessGuard, RUN, RUNNING, TWO_CARDS, fake_comedi,
+    wait_for,
 };
 
 const RAMPING_DOWN: u8 = 4;
@@ -30,15 +31,15 @@ fn command(bench: &Bench, library: &Path, record: &str, more: &[&str]) -> std::p
     command
 }
 
-/// A heartbeat that changes in every tick, and no more after `kill -9`: what the enable line shows then is nobody's.
+/// A heartbeat that toggles in every tick, and stops after `kill -9`, when the enable line is no longer controlled.
 pub fn a_heartbeat_ends_with_the_process(bench: &Bench) {
     let (library, file) = (fake_comedi(bench), bench.path("beats"));
     let mut command = command(bench, &library, "killed.rec", &["--arm"]);
     let length = || fs::metadata(&file).map_or(0, |found| found.len());
-    // Not for long, and again: ticks that this computer misses end the run.
+    // In short runs, repeated: missed ticks of this computer end a run.
     let beats = |_| {
         let _ = fs::remove_file(&file);
-        let mut running = Running::new(command.env("FAKE_BEATS", &file));
+        let mut running = ProcessGuard::new(command.env("FAKE_BEATS", &file));
         while running.goes_on() {
             if length() > 16 * 300 {
                 return Some(running);
@@ -74,7 +75,7 @@ pub fn a_heartbeat_ends_with_the_process(bench: &Bench) {
     assert!(beats[beats.len() - 1][0] <= dead + 2 * PERIOD && length() / 16 == beats.len() as u64);
 }
 
-/// `FAKE_PER_CODE` of linear legs of the reference platform: what each gauge shows of each leg's code.
+/// `FAKE_PER_CODE` for linear legs of the reference platform: response of each gauge to each leg's code.
 fn follows(bench: &Bench) -> String {
     let machine = bench.machine();
     let place = |names: &[String], name: &str| names.iter().position(|found| found == name).unwrap();
@@ -84,7 +85,7 @@ fn follows(bench: &Bench) -> String {
     let mut standing = machine.standing(&input).unwrap();
     let mut output = vec![0; machine.output_names().len()];
     standing.show(&machine, &output, &mut input);
-    // Five stacks of 0.1262 um/V, of which small motions show a part; steps of the converters.
+    // Five stacks of 0.1262 um/V, reduced for small motions; steps of the converters.
     let metres_per_code = 0.8 * 5.0 * 0.1262e-6 * 150.0 / 65_535.0;
     let metres_per_step = 110e-6 / 131_071.0;
     let mut per_code = [[0.0; 6]; 6];
@@ -99,12 +100,12 @@ fn follows(bench: &Bench) -> String {
     per_code.as_flattened().iter().map(|number| format!("{number} ")).collect()
 }
 
-/// Starts it until it runs: a computer that is no real-time PC misses ticks, of which arming takes none.
-fn comes_to_run(command: &mut std::process::Command, link: &Path) -> (Running, Host) {
+/// Starts it repeatedly until it runs: arming tolerates no missed ticks, which an ordinary computer has.
+fn comes_to_run(command: &mut std::process::Command, link: &Path) -> (ProcessGuard, Host) {
     for _ in 0..50 {
-        // One that a program before this left is there, and nobody answers it.
+        // A socket of an earlier program may exist without a listener.
         let _ = fs::remove_file(link);
-        let running = Running::new(command);
+        let running = ProcessGuard::new(command);
         wait_for("the link", || link.exists());
         let mut host = Host::open(link, 1).unwrap();
         host.wait("a tick", |status| status.tick > 0);
@@ -122,7 +123,7 @@ fn comes_to_run(command: &mut std::process::Command, link: &Path) -> (Running, H
     panic!("it never runs");
 }
 
-/// What a contact that opens leads to: the phase of that very tick and the last one, the cause and its event bit.
+/// Effect of an opening contact: phase in the same tick and at the end, cause, event bit.
 struct Stop {
     contacts: &'static str,
     phases: [u8; 2],
@@ -131,7 +132,7 @@ struct Stop {
     name: &'static str,
 }
 
-/// Emergency stop and amplifier fault of a spec that says `"off"`, as by default.
+/// Emergency stop and amplifier fault with the default action `"off"`.
 pub fn contacts_stop_the_machine(bench: &Bench) {
     let emergency =
         Stop { contacts: "01", phases: [FAULTED, FAULTED], cause: EMERGENCY_STOP, event: STOP, name: "emergency stop" };
@@ -145,7 +146,7 @@ fn amplifier_fault(phases: [u8; 2]) -> Stop {
     Stop { contacts: "10", phases, cause: AMPLIFIER_FAULT, event: AMPLIFIER, name: "amplifier fault" }
 }
 
-/// The two other actions, each a controller of its own.
+/// The two other actions, each with a separate controller.
 #[test]
 #[ignore = "long: programs of other specs"]
 fn a_fault_of_an_amplifier_ramps_down_or_holds_where_the_spec_says_so() {
@@ -173,7 +174,7 @@ fn opens(bench: &Bench, stop: &Stop) {
     let more = ["--link-silence", "5000", "--link", link.to_str().unwrap()];
     let mut command = command(bench, &library, "contacts.rec", &more);
     command.env("FAKE_CONTACTS", &file).env("FAKE_PER_CODE", &per_code);
-    // More often than the end of the program would try.
+    // More often than the program retries at its end.
     command.env("FAKE_REFUSES", "5").env("FAKE_LOG", bench.path("contacts.log"));
     let (running, mut host) = comes_to_run(&mut command, &link);
     set(contacts);
@@ -181,7 +182,7 @@ fn opens(bench: &Bench, stop: &Stop) {
     let holds = phases[1] == HOLDING;
     let ended = host.wait("its end", |status| status.phase == phases[1]);
     assert_eq!((ended.cause, ended.amplifier_on), (cause, holds), "{name}");
-    // While the contact is open a request to run, or an acknowledgement, changes nothing.
+    // While the contact is open, a request to run or an acknowledgement has no effect.
     for request in [RUN, NONE, ACKNOWLEDGE, NONE] {
         host.done(&Request::Supervise { request });
         std::thread::sleep(Duration::from_millis(20));
@@ -214,12 +215,12 @@ fn opens(bench: &Bench, stop: &Stop) {
     assert_eq!(then & 0xffff, u32::from(phases[0]) | u32::from(cause) << 8, "{name}, in that very tick");
 }
 
-/// The memory of machine and controller is taken away in mid-run: both end in order, amplifiers off.
+/// The shared memory of machine and controller is truncated during a run: both end properly, with amplifiers off.
 pub fn shared_memory_that_becomes_shorter_ends_nobody(mut bench: Bench) {
     let link = bench.path("shorter.link");
     let mut command = bench.command("shorter.rec");
     command.args(["--elastic", "--sim-timeout", "5000", "--link-silence", "20000", "--link"]).arg(&link);
-    let running = Running::new(&mut command);
+    let running = ProcessGuard::new(&mut command);
     wait_for("the link", || link.exists());
     let mut host = Host::open(&link, 1).unwrap();
     host.wait("a tick", |status| status.tick > 0);

@@ -1,4 +1,4 @@
-//! Clients that keep a place, the orders or the service busy: `ramp-down` from another host is taken within a second all the same.
+//! Clients that occupy connections, control or the service: `ramp-down` from another host still takes effect within a second.
 
 use std::io::Write;
 use std::os::unix::net::UnixStream;
@@ -15,7 +15,7 @@ use specgen_link::{Refusal, Request};
 
 use super::host::Host;
 use super::{
-    ACKNOWLEDGE, ARM, Bench, FAULTED, HOLD, HOLDING, HOST_GONE, LINK_LOST, NONE, RAMP_DOWN, RUN, RUNNING, Running,
+    ACKNOWLEDGE, ARM, Bench, FAULTED, HOLD, HOLDING, HOST_GONE, LINK_LOST, NONE, ProcessGuard, RAMP_DOWN, RUN, RUNNING,
     signal, wait_for,
 };
 use crate::support::length;
@@ -56,12 +56,12 @@ struct Site {
 }
 
 impl Site {
-    /// A host that arms and runs the machine, from wherever it stands.
+    /// A host that arms and runs the machine, from any phase.
     fn run(&self) -> Host {
         let mut host = Host::open(&self.link, 1).unwrap();
         host.wait("the way down", |status| !status.amplifier_on);
         for request in [NONE, ACKNOWLEDGE, NONE, ARM] {
-            wait_for("the orders", || host.asks(request));
+            wait_for("control", || host.asks(request));
             std::thread::sleep(Duration::from_millis(50));
         }
         host.wait("armed", |status| status.phase == HOLDING);
@@ -70,7 +70,7 @@ impl Site {
         host
     }
 
-    /// The time that a new host takes to ask for the way down, and whether the machine goes there.
+    /// Measures the time in which a new host can request a ramp-down, and asserts that the machine ramps down.
     fn down(&self, what: &str) {
         let start = Instant::now();
         let mut host = Host::open(&self.link, 77).unwrap_or_else(|error| panic!("{what}: {error}"));
@@ -97,7 +97,7 @@ pub fn nobody_keeps_others_from_ramping_down(bench: &Bench) {
     let site = Site { link: bench.path("clients.link") };
     let mut command = bench.command("clients.rec");
     command.args(["--elastic", "--sim-timeout", "5000", "--link-silence", "500", "--link-idle", "1", "--link"]);
-    let running = Running::new(command.arg(&site.link));
+    let running = ProcessGuard::new(command.arg(&site.link));
     wait_for("the link", || site.link.exists());
 
     a_stopped_operate_loses_the_orders(&site);
@@ -110,10 +110,10 @@ pub fn nobody_keeps_others_from_ramping_down(bench: &Bench) {
         under_a_flood(&site);
         one_that_never_returns_is_not_waited_for(&site);
     }
-    one_without_the_orders_stops_the_program(&site, running);
+    client_without_control_stops_the_program(&site, running);
 }
 
-/// Stopped while it has the orders and its machine runs.
+/// A host in control that is stopped while its machine runs.
 fn a_stopped_operate_loses_the_orders(site: &Site) {
     let script = ["none", "acknowledge", "none", "arm", "wait holding", "run", "wait 600"];
     let mut operate = site.operate(&script).spawn().unwrap();
@@ -121,14 +121,14 @@ fn a_stopped_operate_loses_the_orders(site: &Site) {
     other.wait("running", |status| status.phase == RUNNING);
     signal(&operate, Signal::STOP);
     site.down("operate stopped");
-    // Silent for longer than a host may be, it loses the orders: it finds its connection closed, and does not go on.
-    wait_for("the orders", || other.asks(NONE));
+    // After a longer silence than permitted, it loses control: its connection is closed, and it does not continue.
+    wait_for("control", || other.asks(NONE));
     signal(&operate, Signal::CONT);
     let status = operate.wait().unwrap();
     assert!(!status.success(), "it lost the orders: {status}");
 }
 
-/// There and never silent, but without an order for longer than `--link-idle`.
+/// A host that is never silent, but sends no command for longer than `--link-idle`.
 fn one_that_only_looks_loses_them(site: &Site) {
     let mut host = site.run();
     host.done(&Request::Supervise { request: RUN });
@@ -139,7 +139,7 @@ fn one_that_only_looks_loses_them(site: &Site) {
         assert_eq!(host.status().phase, RUNNING);
         std::thread::sleep(Duration::from_millis(5));
     }
-    // Not only a hold, which is taken from every host: it has the orders now.
+    // Not only a hold, which every host may request: it is in control now.
     other.done(&Request::Supervise { request: RUN });
     other.done(&Request::Supervise { request: HOLD });
     other.wait("held by the next", |status| status.phase == HOLDING);
@@ -148,7 +148,7 @@ fn one_that_only_looks_loses_them(site: &Site) {
     site.down("an idle host");
 }
 
-/// By the times of the spec: it holds, and after 10 s it ramps down and switches off, with nobody asking for it.
+/// By the times of the spec: it holds, and after 10 s it ramps down and switches off, without a request.
 fn one_that_never_returns_is_not_waited_for(site: &Site) {
     let host = site.run();
     let mut other = Host::open(&site.link, 9).unwrap();
@@ -161,8 +161,8 @@ fn one_that_never_returns_is_not_waited_for(site: &Site) {
     drop(host);
 }
 
-/// `operate stop` is taken while another host has the orders, and returns when the program has ended.
-fn one_without_the_orders_stops_the_program(site: &Site, running: Running) {
+/// `operate stop` takes effect while another host is in control, and returns when the program has ended.
+fn client_without_control_stops_the_program(site: &Site, running: ProcessGuard) {
     let kept = ControllingHost::new(site.run());
     let stopped = site.operate(&["stop"]).status().unwrap();
     assert!(stopped.success() && !site.link.exists(), "{stopped}");
@@ -172,7 +172,7 @@ fn one_without_the_orders_stops_the_program(site: &Site, running: Running) {
     drop(kept);
 }
 
-/// Noise and requests as fast as they go.
+/// Noise and requests at full speed.
 fn under_a_flood(site: &Site) {
     let over = AtomicBool::new(false);
     let noise: Vec<u8> = (0..4096_u32).map(|k| (k.wrapping_mul(2_654_435_761) >> 13) as u8).collect();
@@ -180,7 +180,7 @@ fn under_a_flood(site: &Site) {
         while !over.load(Ordering::Relaxed) {
             let Ok(mut stream) = UnixStream::connect(&site.link) else { continue };
             let mut reader = stream.try_clone().unwrap();
-            // Answers are read, so that it is not closed for leaving them.
+            // Read answers, because a client that does not is disconnected.
             std::thread::spawn(move || std::io::copy(&mut reader, &mut std::io::sink()));
             while !over.load(Ordering::Relaxed) {
                 if stream.write_all(&noise).is_err() {

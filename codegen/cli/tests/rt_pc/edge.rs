@@ -1,5 +1,5 @@
-//! What waits for the edge of the input line, as an operator orders it: the record says in which tick the line rose, and that what waited
-//! began with the next one.
+//! Commands that wait for an edge of the input line: the record shows the tick of the edge, and that the command started in the next
+//! tick.
 
 use std::fs;
 use std::io::Write;
@@ -12,17 +12,17 @@ use specgen_link::client::{Port, Timeout};
 use specgen_runtime::pending::{EDGE, Stage};
 use specgen_runtime::setpoint::CommandKind;
 
-use super::{BUSY, Bench, Running, wait_for};
+use super::{BUSY, Bench, ProcessGuard, wait_for};
 
 /// Ticks from edge to edge: 0.4 s of the machine.
 const EVERY: u64 = 4000;
 const WAVE: &str = "ramp = 0.02\nseconds = 0.1\n[[axis]]\naxis = \"z\"\nshape = { kind = \"sine\", amplitude = 1e-6, frequency = 20.0 }\n";
 
-/// Looks until it is as wanted.
-fn until<P: Port>(looker: &mut Session<P>, what: &str, mut wanted: impl FnMut(&mut Session<P>) -> bool) {
+/// Polls until a condition holds.
+fn until<P: Port>(observer: &mut Session<P>, what: &str, mut wanted: impl FnMut(&mut Session<P>) -> bool) {
     let start = Instant::now();
-    while !wanted(looker) {
-        assert!(start.elapsed() < Duration::from_secs(120), "{what} does not come: {:?}", looker.edge(false));
+    while !wanted(observer) {
+        assert!(start.elapsed() < Duration::from_secs(120), "{what} does not appear: {:?}", observer.edge(false));
         std::thread::sleep(Duration::from_millis(5));
     }
 }
@@ -34,42 +34,42 @@ fn an_edge_of_the_input_line_starts_what_waits_for_it_in_the_next_tick() {
     let link = bench.path("edge.link");
     let mut command = bench.command("edge.rec");
     command.args(["--elastic", "--sim-timeout", "5000", "--sim-edge-every", "0.4", "--link"]).arg(&link);
-    let running = Running::new(&mut command);
+    let running = ProcessGuard::new(&mut command);
     wait_for("the link", || link.exists());
-    let mut looker = Session::open(SocketLine::open(&link).unwrap(), Timeout::SOCKET, None).unwrap();
+    let mut observer = Session::open(SocketLine::open(&link).unwrap(), Timeout::SOCKET, None).unwrap();
     fs::write(bench.path("wave.toml"), WAVE).unwrap();
     let mut command = Command::new(env!("CARGO_BIN_EXE_specgen"));
     command.current_dir(bench.folder.path()).arg("operate").arg("--socket").arg(&link).arg(&bench.spec);
-    let mut operate = Running::new(command.stdin(Stdio::piped()));
+    let mut operate = ProcessGuard::new(command.stdin(Stdio::piped()));
     let mut input = operate.0.as_mut().unwrap().stdin.take().unwrap();
     let mut say = |lines: &str| input.write_all(lines.as_bytes()).unwrap();
     let stage =
         |session: &mut Session<SocketLine>| Stage::from_word(u64::from(session.edge(false).unwrap().stage)).unwrap();
 
-    // A machine that does not run waits for nothing; what is dropped does not begin; the last order counts.
+    // A machine that is not running accepts no waiting command; a dropped one does not start; the last one wins.
     say("on-edge\non-edge move z=1um\narm\nwait holding\nrun\nwait running\nwait arrived\n");
     say("on-edge move z=1um\non-edge drop\non-edge\non-edge move z=1um\non-edge goto zero\njog z=0.5um\non-edge\n");
-    until(&mut looker, "the step", |session| session.place().unwrap().unwrap().target[2] > 0.49e-6);
-    let edges = looker.edge(false).unwrap().edges;
-    until(&mut looker, "an edge more", |session| session.edge(false).unwrap().edges > edges + 1);
-    assert_eq!(stage(&mut looker), Stage::Dropped);
+    until(&mut observer, "the step", |session| session.place().unwrap().unwrap().target[2] > 0.49e-6);
+    let edges = observer.edge(false).unwrap().edges;
+    until(&mut observer, "one more edge", |session| session.edge(false).unwrap().edges > edges + 1);
+    assert_eq!(stage(&mut observer), Stage::Dropped);
     let mut begun = Vec::new();
     for order in ["on-edge jog z=1um\non-edge move x=2um z=1um\n", "on-edge wave wave.toml\n", "on-edge goto zero\n"] {
         say("wait arrived\nset command=hold\nwait 0.05\n");
         say(order);
         let last = begun.last().copied();
-        until(&mut looker, order, |session| {
+        until(&mut observer, order, |session| {
             let edge = session.edge(false).unwrap();
             u64::from(edge.stage) == Stage::Begun.word() && last != Some(edge.tick)
         });
-        begun.push(looker.edge(false).unwrap().tick);
-        until(&mut looker, "rest", |session| {
+        begun.push(observer.edge(false).unwrap().tick);
+        until(&mut observer, "rest", |session| {
             let (tick, status) = (session.poll().unwrap().tick, session.status().status);
             tick > begun.last().unwrap() + 1500 && status & BUSY == 0
         });
     }
-    // Another host has no business with it.
-    assert!(looker.edge(true).is_err());
+    // Another host may not do that.
+    assert!(observer.edge(true).is_err());
     say("on-edge\nramp-down\nwait disarmed\n");
     drop(input);
     let operated = operate.wait();
@@ -98,7 +98,7 @@ fn an_edge_of_the_input_line_starts_what_waits_for_it_in_the_next_tick() {
     a_card_has_lines_for_triggers(&bench);
 }
 
-/// Outputs behind the enable line, the input behind them, which is looked at once a tick.
+/// Output lines follow the enable line, then the input line, which is read once per tick.
 fn a_card_has_lines_for_triggers(bench: &Bench) {
     let library = super::fake_comedi(bench);
     let output = super::on_card(bench, &library, &[("FAKE_HIGH_AFTER", "100")], &super::TWO_CARDS);

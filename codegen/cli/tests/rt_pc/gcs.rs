@@ -1,5 +1,5 @@
-//! `specgen gcs` between clients of the General Command Set and the real-time program, byte by byte as clients talk. Times are printed,
-//! not asserted.
+//! `specgen gcs` between clients of the General Command Set and the real-time program, with the exact bytes of clients. Times are
+//! printed, not asserted.
 
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
@@ -13,13 +13,13 @@ use specgen_link::Request;
 use specgen_link::client::Timeout;
 
 use super::host::Host;
-use super::{Bench, DISARMED, HOLDING, NONE, RUNNING, Running, signal, wait_for};
+use super::{Bench, DISARMED, HOLDING, NONE, ProcessGuard, RUNNING, signal, wait_for};
 use crate::support::length;
 
-/// How far the platform may be from its target once it has arrived, µm: the gauges' noise many times over, and nothing of a move.
+/// Largest distance from the target after arrival, µm: much more than the gauges' noise, much less than a move.
 const THERE: f64 = 0.05;
 
-/// The bridge, at a port of its own.
+/// The bridge, at a separate port.
 pub struct Bridge {
     process: Option<Child>,
     port: u16,
@@ -39,7 +39,7 @@ impl Bridge {
             let line = line.unwrap();
             line.split_once("GCS at 127.0.0.1:")?.1.split(';').next()?.parse().ok()
         });
-        // What it says later is nobody's: it must not wait for that.
+        // Discard its later output, so that it does not block.
         std::thread::spawn(move || said.for_each(drop));
         Self { process: Some(process), port: port.unwrap() }
     }
@@ -51,7 +51,7 @@ impl Bridge {
         Client(stream)
     }
 
-    /// As Ctrl-C does.
+    /// Ends it like Ctrl-C.
     pub fn end(mut self) {
         let mut process = self.process.take().unwrap();
         signal(&process, Signal::INT);
@@ -98,7 +98,7 @@ impl Client {
         self.answer()
     }
 
-    /// Sends bytes as they are; an answer for each that asks.
+    /// Sends raw bytes; returns an answer for each query.
     fn exchange<const N: usize>(&mut self, bytes: &[u8]) -> [String; N] {
         self.0.write_all(bytes).unwrap();
         std::array::from_fn(|_| self.answer())
@@ -108,7 +108,7 @@ impl Client {
         self.ask("ERR?")
     }
 
-    /// Sends what has no answer; the error that it came to.
+    /// Sends a command without an answer; returns its error.
     pub fn order(&mut self, text: &str) -> String {
         self.send(text);
         self.error()
@@ -127,29 +127,29 @@ pub fn clients_move_it_and_none_disturbs_it(bench: &Bench) {
     let link = bench.path("gcs.link");
     let mut command = bench.command("gcs.rec");
     command.args(["--elastic", "--sim-timeout", "5000", "--link-silence", "1000", "--link"]).arg(&link);
-    let running = Running::new(&mut command);
+    let running = ProcessGuard::new(&mut command);
     wait_for("the link", || link.exists());
     let bridge = Bridge::new(bench, &[]);
-    let mut looker = Session::open(SocketLine::open(&link).unwrap(), Timeout::SOCKET, None).unwrap();
-    let mut look = || looker.place().unwrap().unwrap();
+    let mut observer = Session::open(SocketLine::open(&link).unwrap(), Timeout::SOCKET, None).unwrap();
+    let mut read_place = || observer.place().unwrap().unwrap();
     let mut first = bridge.client();
 
-    // Orders of the link that another host has are refused, and the bridge goes on.
+    // While another host of the link is in control, commands are refused, and the bridge continues.
     let mut host = Host::open(&link, 7).unwrap();
     host.done(&Request::Supervise { request: NONE });
     assert_eq!([first.order("SVO X 1"), first.ask("SVO? X")], ["89", "X=0"]);
     drop(host);
 
-    who_is_there(&mut first, &mut look);
-    moves_are_made_or_refused_before_anything_moves(&mut first, &mut look);
-    latency(&mut first, &mut look);
+    identification(&mut first, &mut read_place);
+    a_refused_move_moves_nothing(&mut first, &mut read_place);
+    latency(&mut first, &mut read_place);
     clients_that_were_tried_are_answered(&mut first);
     let mut second = bridge.client();
-    others_look_and_stop_and_are_no_burden((&bridge, &link), &mut first, &mut second, &mut look);
-    one_that_leaves_leaves_the_orders(first, &mut second, &mut look);
-    // A bridge that is killed is a lost host: the machine holds. Another one goes on when it is asked to.
+    other_clients_may_read_and_stop((&bridge, &link), &mut first, &mut second, &mut read_place);
+    control_is_free_once_a_client_leaves(first, &mut second, &mut read_place);
+    // If the bridge is killed, the host is lost, and the machine holds. Another bridge can continue.
     drop(bridge);
-    wait_for("the hold", || look().phase == HOLDING);
+    wait_for("the hold", || read_place().phase == HOLDING);
     let bridge = Bridge::new(bench, &[]);
     let mut client = bridge.client();
     assert_eq!([client.ask("SVO? X"), client.order("MOV X 1")], ["X=0", "5"]);
@@ -158,9 +158,9 @@ pub fn clients_move_it_and_none_disturbs_it(bench: &Bench) {
     assert!((client.value("POS? X") - 1.0).abs() < THERE);
     drop(client);
     bridge.end();
-    assert_eq!(look().phase, DISARMED, "Ctrl-C ramps down");
+    assert_eq!(read_place().phase, DISARMED, "Ctrl-C ramps down");
 
-    // Under one name for an axis, as clients of single stages want it; and off is off.
+    // With a single named axis, for clients of single stages; and servo off works.
     let bridge = Bridge::new(bench, &["--axis", "1=Z"]);
     let mut client = bridge.client();
     assert_eq!(client.ask("SAI?"), "1");
@@ -170,7 +170,7 @@ pub fn clients_move_it_and_none_disturbs_it(bench: &Bench) {
     client.settle();
     assert!((client.value("POS? 1") - 3.0).abs() < THERE);
     assert_eq!(client.order("SVO 1 0"), "0");
-    wait_for("the way down", || look().phase == DISARMED);
+    wait_for("the ramp down", || read_place().phase == DISARMED);
     assert_eq!([client.ask("SVO? 1"), client.order("MOV 1 1")], ["1=0", "5"]);
     drop(client);
     a_program_of_others(bench, bridge.port);
@@ -181,7 +181,7 @@ pub fn clients_move_it_and_none_disturbs_it(bench: &Bench) {
     assert_eq!(causes, [Some("LinkLost")], "never disturbed but by the bridge that was killed: {summary:#}");
 }
 
-/// The free client `qmi` with its driver of a single stage, where it is installed.
+/// The free client `qmi` with its driver of a single stage, if installed.
 fn a_program_of_others(bench: &Bench, port: u16) {
     let python = std::env::var("SPECGEN_PYTHON").unwrap_or_else(|_| "python3".to_owned());
     let has = Command::new(&python).args(["-c", "import qmi"]).stderr(Stdio::null()).status();
@@ -192,37 +192,37 @@ fn a_program_of_others(bench: &Bench, port: u16) {
     }
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/rt_pc/qmi_client.py");
     let mut command = Command::new(&python);
-    // It writes its log there.
+    // It writes its log to the home folder.
     command.env("QMI_HOME", bench.folder.path()).arg(script).arg(port.to_string());
     let output = command.output().unwrap();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     print!("{}", String::from_utf8_lossy(&output.stdout));
 }
 
-fn who_is_there(client: &mut Client, look: &mut impl FnMut() -> Place) {
+fn identification(client: &mut Client, read_place: &mut impl FnMut() -> Place) {
     let name = client.ask("*IDN?");
     assert!(name.starts_with("specgen,HEXAPOD reference,") && name.split(',').count() == 4, "{name}");
     assert_eq!([client.ask("CSV?"), client.error()], ["2.0", "0"]);
     assert_eq!(client.ask("SAI? ALL"), "X \nY \nZ \nU \nV \nW");
     assert_eq!([client.ask("SVO? X U"), client.single(4)], ["X=0 \nU=0", "65536"]);
-    // What the strokes allow, not what the workspace says: below rest there is no voltage.
+    // Limits are those of the strokes, not of the workspace: there is no voltage below rest.
     let (lowest, highest, right) = (client.value("TMN? Z"), client.value("PLM? Z"), client.value("TMX? X"));
     assert!(
         (-9.9..-9.0).contains(&lowest) && (highest - 42.0).abs() < 1e-6 && right < 20.0,
         "{lowest} {highest} {right}"
     );
     assert_eq!(client.order("MOV X 1"), "5");
-    assert_eq!(look().phase, DISARMED);
+    assert_eq!(read_place().phase, DISARMED);
     assert_eq!([client.order("SVO X 1"), client.ask("SVO? X")], ["0", "X=1"]);
     assert_eq!(client.order("FRF"), "0");
-    // Waits for the machine as it comes up.
+    // Waits while the machine starts.
     assert_eq!(client.order("MOV X 0 Y 0 Z 15 U 0 V 0 W 0"), "0");
     client.settle();
     assert_eq!([client.ask("ONT? Z"), client.single(7), client.single(4)], ["Z=1", "\u{b1}", "102400"]);
-    assert_eq!(look().phase, RUNNING);
+    assert_eq!(read_place().phase, RUNNING);
 }
 
-fn moves_are_made_or_refused_before_anything_moves(client: &mut Client, look: &mut impl FnMut() -> Place) {
+fn a_refused_move_moves_nothing(client: &mut Client, read_place: &mut impl FnMut() -> Place) {
     let mut worst: f64 = 0.0;
     let moves = length(6, 100_u32);
     for count in 0..moves {
@@ -240,7 +240,7 @@ fn moves_are_made_or_refused_before_anything_moves(client: &mut Client, look: &m
     client.settle();
     assert_eq!([client.value("MOV? X"), client.value("MOV? Y")], [1.5, 2.0]);
 
-    let before = look();
+    let before = read_place();
     for (order, code) in [
         ("MOV Q 1", "15"),
         ("MOV X 1 Q 1", "15"),
@@ -260,23 +260,23 @@ fn moves_are_made_or_refused_before_anything_moves(client: &mut Client, look: &m
         ("VEL X 100", "0"),
     ] {
         assert_eq!(client.order(order), code, "{order}");
-        let now = look();
+        let now = read_place();
         assert!(now.target == before.target && now.phase == RUNNING && now.status >> 16 == 0, "{order}: {now:?}");
     }
     assert_eq!(client.ask("VMO? X 1 Y 2"), "1");
     assert_eq!(client.ask("VMO? Z -11"), "0");
-    // As far as the direction leads, and no further.
+    // Up to the reach along a direction, and no further.
     let far = client.value("TRA? X 1");
     assert_eq!(client.order(&format!("MOV X {:.6}", far - 0.001)), "0");
     assert_eq!(client.order(&format!("MOV X {:.6}", far + 0.001)), "7");
-    // Stopped on the way, it stands where it says.
+    // After a stop during a move, it is at the reported position.
     wait_for("the motion", || client.value("POS? X") > 3.0);
     client.0.write_all(&[24]).unwrap();
     assert_eq!(client.error(), "10");
     client.settle();
     let stood = client.value("MOV? X");
     assert!(stood < far - 1.0 && (client.value("POS? X") - stood).abs() < THERE, "{stood}");
-    // About a pivot: turned, its coordinates stay, and those of the platform move.
+    // A rotation about a pivot keeps its coordinates, and moves those of the platform.
     assert_eq!(client.order("MOV X 0 Y 0"), "0");
     client.settle();
     assert_eq!(client.order("SPI T -10000"), "0");
@@ -284,22 +284,22 @@ fn moves_are_made_or_refused_before_anything_moves(client: &mut Client, look: &m
     client.settle();
     assert_eq!([client.value("MOV? X"), client.ask("SPI? T").trim_start_matches("T=").parse().unwrap()], [0.0, -1e4]);
     // −(R − I) c of c = (0, 0, −10 mm) turned by 100 µrad about y: +1 µm in x.
-    let x = look().target[0];
+    let x = read_place().target[0];
     assert!((x - 1e-6).abs() < 1e-10, "{x}");
     assert_eq!([client.order("SPI T 0"), client.order("MOV V 0 X 0")], ["9", "0"]);
     client.settle();
     assert_eq!(client.order("SPI T 0"), "0");
 }
 
-/// From the order on the wire to the first tick whose set-point follows it, as another host sees it.
-fn latency(client: &mut Client, look: &mut impl FnMut() -> Place) {
+/// Latency from a command to the first tick whose set-point follows it, as seen by another host.
+fn latency(client: &mut Client, read_place: &mut impl FnMut() -> Place) {
     let times = length(3, 50);
     let mut times: Vec<f64> = (0..times)
         .map(|count| {
-            let before = look().target;
+            let before = read_place().target;
             let start = Instant::now();
             client.send(&format!("MOV Y {}", 2 - count % 2));
-            while look().target == before {
+            while read_place().target == before {
                 assert!(start.elapsed() < Duration::from_secs(20));
             }
             let time = start.elapsed().as_secs_f64() * 1e3;
@@ -316,10 +316,10 @@ fn latency(client: &mut Client, look: &mut impl FnMut() -> Place) {
     );
 }
 
-/// What Micro-Manager's `PI_GCS_2` and EPICS' `motorPIGCS2` sent when they were tried, byte by byte.
+/// The exact bytes that Micro-Manager's `PI_GCS_2` and EPICS' `motorPIGCS2` sent in a trial.
 fn clients_that_were_tried_are_answered(client: &mut Client) {
-    // Micro-Manager: its start, which goes on without `EAX`, and a move. It reads the mask as C does: `3F` would be no number to it, and
-    // the platform at rest.
+    // Micro-Manager: its start, which continues without `EAX`, and a move. It parses the mask as C does: it could not parse `3F`, and
+    // would take the platform to be at rest.
     assert_eq!(client.exchange::<5>(b"*IDN?\nTPC?\nERR?\nJON? 1\nERR?\n")[1..], ["0", "0", "1=0", "0"]);
     assert_eq!(client.exchange(b"EAX X 1\nERR?\nSVO X 1\nERR?\nHIN? X\nCSV?\nERR?\n"), ["2", "0", "X=0", "2.0", "0"]);
     assert_eq!(client.exchange(b"MOV X -5.12 Y 2.25\nERR?\n\x05ERR?\n"), ["0", "0x3F", "0"]);
@@ -334,7 +334,7 @@ fn clients_that_were_tried_are_answered(client: &mut Client) {
     assert_eq!(client.exchange(b"HLT X\nERR?\n"), ["10"]);
     client.send("HLT Y");
     client.settle();
-    // It has not asked what became of the second stop: the next move is made, and that is what it is told of it.
+    // It has not queried the error of the second stop, so it gets that error after the next move, which is executed.
     assert_eq!(client.exchange(b"MOV X 0 Y 0\nERR?\nMOV X 1 Y 0\nERR?\n"), ["10", "0"]);
     client.settle();
     assert_eq!(client.exchange(b"FRF X Y \nERR?\n\x07"), ["0", "\u{b1}"]);
@@ -347,7 +347,7 @@ fn clients_that_were_tried_are_answered(client: &mut Client) {
     assert_eq!(client.exchange(b"SVO Z 1\nERR?\nFRF Z\nERR?\n\x05"), ["0", "0", "0"]);
     assert_eq!(client.order("MOV X 0 Z 15"), "0");
     client.settle();
-    // Sockets as most clients have them: what follows a command without an answer waits until that has been acknowledged.
+    // Like most clients without TCP_NODELAY: data after a command without an answer waits for its acknowledgement.
     client.0.set_nodelay(false).unwrap();
     let mut times: Vec<f64> = (0..length(5, 20))
         .map(|_| {
@@ -361,27 +361,27 @@ fn clients_that_were_tried_are_answered(client: &mut Client) {
     println!("gcs: order and ERR? without TCP_NODELAY: {:.2} ms (median)", times[times.len() / 2]);
 }
 
-fn others_look_and_stop_and_are_no_burden(
+fn other_clients_may_read_and_stop(
     (bridge, link): (&Bridge, &Path),
     first: &mut Client,
     second: &mut Client,
-    look: &mut impl FnMut() -> Place,
+    read_place: &mut impl FnMut() -> Place,
 ) {
     assert_eq!([second.order("MOV X 1"), second.order("SVO X 0")], ["89", "89"]);
-    // Who only looks is not missed when it leaves, and does not say so.
+    // A host that only queries is not missed when it leaves, and prints no warning.
     let mut operate = Command::new(env!("CARGO_BIN_EXE_specgen"));
     let looked = operate.args(["operate", "--socket"]).arg(link).args(["status", "where", "limits"]).output().unwrap();
     let (said, shown) = (String::from_utf8_lossy(&looked.stderr), String::from_utf8_lossy(&looked.stdout));
     assert!(looked.status.success() && !said.contains("holds, then ramps down"), "{said}");
     assert!(shown.contains("running, amplifiers on") && shown.contains("  legs 0 to 5: "), "{shown}");
-    // One that asks and never listens, one that sends what is no command, one that is gone in the middle of a line.
+    // One that queries and never reads, one that sends invalid commands, one that disconnects within a line.
     let mut deaf = bridge.client();
     deaf.0.set_write_timeout(Some(Duration::from_millis(100))).unwrap();
     let _ = deaf.0.write_all(&b"POS?\n".repeat(100_000));
     let mut garbage = bridge.client();
     let bytes: Vec<u8> = (0..40_000_u32).map(|count| (count.wrapping_mul(2_654_435_761) >> 24) as u8).collect();
     garbage.0.set_write_timeout(Some(Duration::from_millis(100))).unwrap();
-    // Without the byte that stops, which anybody may send.
+    // Without the stop byte, which every client may send.
     let _ = garbage.0.write_all(&bytes.into_iter().filter(|byte| *byte != 24).collect::<Vec<_>>());
     bridge.client().0.write_all(b"MOV X").unwrap();
     second.0.write_all(&b"XYZZY 1 2\n".repeat(10_000)).unwrap();
@@ -390,25 +390,29 @@ fn others_look_and_stop_and_are_no_burden(
         assert_eq!(first.order(&format!("MOV X {to:.6}")), "0", "{count}");
         first.settle();
         assert!((first.value("POS? X") - to).abs() < THERE);
-        assert_eq!(look().phase, RUNNING);
+        assert_eq!(read_place().phase, RUNNING);
     }
     assert_eq!([second.error(), second.error()], ["2", "0"]);
-    // Anybody may stop.
+    // Every client may stop.
     assert_eq!(first.order("MOV X 30"), "0");
     wait_for("the motion", || second.value("POS? X") > 5.0);
     assert_eq!(second.order("HLT"), "10");
     first.settle();
-    assert!(first.value("MOV? X") < 29.0 && look().phase == RUNNING);
+    assert!(first.value("MOV? X") < 29.0 && read_place().phase == RUNNING);
     assert_eq!(first.error(), "0", "each client has its own errors");
 }
 
-fn one_that_leaves_leaves_the_orders(mut first: Client, second: &mut Client, look: &mut impl FnMut() -> Place) {
+fn control_is_free_once_a_client_leaves(
+    mut first: Client,
+    second: &mut Client,
+    read_place: &mut impl FnMut() -> Place,
+) {
     assert_eq!(first.order("MOV X -20"), "0");
     wait_for("the motion", || second.value("POS? X") < 0.0);
     drop(first);
     second.settle();
     assert!((second.value("POS? X") + 20.0).abs() < THERE, "it goes where it was sent, and stays");
-    assert_eq!(look().phase, RUNNING);
+    assert_eq!(read_place().phase, RUNNING);
     assert_eq!([second.order("MOV X 0"), second.error()], ["0", "0"]);
     second.settle();
 }

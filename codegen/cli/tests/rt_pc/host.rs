@@ -1,4 +1,4 @@
-//! A host at the other end of the link, and records as it sees them.
+//! A host on the link, and its records.
 
 use std::io::{self, ErrorKind, Read, Write};
 use std::os::unix::net::UnixStream;
@@ -63,17 +63,17 @@ impl Host {
         }
     }
 
-    /// Whether the supervisor is asked: a host without the orders is refused.
+    /// Whether a request to the supervisor is accepted: a host that is not in control is refused.
     pub fn asks(&mut self, request: u8) -> bool {
         matches!(self.client.ask(&Request::Supervise { request }), Ok(Reply::Done))
     }
 
-    /// Whether it is answered.
+    /// Whether it still gets answers.
     pub fn is_answered(&mut self) -> bool {
         self.client.ask(&Request::Status).is_ok()
     }
 
-    /// Asks for the status, which keeps the link alive, until it is as wanted.
+    /// Polls the status, which keeps the link alive, until a condition holds.
     pub fn wait(&mut self, what: &str, wanted: impl Fn(&Status) -> bool) -> Status {
         let start = Instant::now();
         loop {
@@ -105,7 +105,7 @@ impl Host {
         self.client.fetch(request).unwrap()
     }
 
-    /// The bare line.
+    /// The raw line.
     pub fn line(&mut self) -> &mut UnixStream {
         &mut self.client.port().0
     }
@@ -135,13 +135,13 @@ impl Record {
         self.names.iter().position(|known| known == name).unwrap()
     }
 
-    /// Runs it again.
+    /// Replays the record.
     pub fn replay(&self, machine: &mut Supervised) -> Replay {
         let mut reader = Reader::new(&self.bytes[..]).unwrap();
         replay(&mut reader, machine, |_, _, _| ()).unwrap_or_else(|error| panic!("{error}"))
     }
 
-    /// The same with one bit of the first code of the last tick flipped, under a checksum that fits.
+    /// A copy with one flipped bit in the first code of the last tick, and a correct checksum.
     pub fn flipped(&self) -> Vec<u8> {
         let mut bytes = self.bytes.clone();
         let word = |at: usize| u64::from_le_bytes(bytes[at..at + 8].try_into().unwrap());

@@ -1,4 +1,4 @@
-//! A motion that repeats, learned over the link on the real-time program and played there under what was learned.
+//! A repeated motion, learned over the link on the real-time program and played there with the learned correction.
 
 use std::path::Path;
 use std::process::{Command, Output};
@@ -7,7 +7,7 @@ use rustix::process::Signal;
 use serde_json::Value;
 
 use super::host::Host;
-use super::{Bench, DISARMED, Running, wait_for};
+use super::{Bench, DISARMED, ProcessGuard, wait_for};
 
 fn specgen(bench: &Bench, arguments: &[&str], link: &Path) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_specgen"));
@@ -15,8 +15,8 @@ fn specgen(bench: &Bench, arguments: &[&str], link: &Path) -> Output {
     command.output().unwrap()
 }
 
-/// With time that waits, so that it runs on any computer. The first pass is without correction: what is learned has to beat it by much on
-/// a machine whose hysteresis and tolerances its controller does not know, and to serve again when it is played from its file.
+/// With elastic time, so that it runs on any computer. The first pass has no correction. The learned correction must be much better on a
+/// machine with hysteresis and tolerances unknown to its controller, also when it is played from its file.
 #[test]
 #[ignore = "long: learning over the link of the real-time program"]
 fn a_motion_is_learned_over_the_link_and_played_under_what_was_learned() {
@@ -35,7 +35,7 @@ fn a_motion_is_learned_over_the_link_and_played_under_what_was_learned() {
     let link = bench.path("learn.link");
     let mut command = bench.command("learn.rec");
     command.args(["--elastic", "--sim-timeout", "5000", "--link-silence", "1000", "--link"]).arg(&link);
-    let running = Running::new(&mut command);
+    let running = ProcessGuard::new(&mut command);
     wait_for("the link", || link.exists());
 
     let spec = spec.to_str().unwrap();
@@ -46,7 +46,7 @@ fn a_motion_is_learned_over_the_link_and_played_under_what_was_learned() {
     let unnamed = learn(&[]);
     let said = String::from_utf8_lossy(&unnamed.stdout) + String::from_utf8_lossy(&unnamed.stderr);
     assert!(unnamed.status.code() == Some(2) && said.contains("--machine NAME"), "{said}");
-    // By the host, then in the background of the program, which the command finds to have learned what the same kernel learns here.
+    // By the host, then in the idle time of the program; the command verifies the result with the same kernel.
     let mut nm = Vec::new();
     for more in [&["--machine", "stage-7"][..], &["--machine", "stage-7", "--on-device", "65536"]] {
         let output = learn(more);
@@ -77,7 +77,7 @@ fn a_motion_is_learned_over_the_link_and_played_under_what_was_learned() {
 
     let output = running.end(Signal::INT);
     let (_, record) = bench.check(&output, "learn.rec");
-    // The correction is an input of the tick, so it stands in the record.
+    // The correction is an input of the tick, so it is in the record.
     let place = record.place("correction[0]");
     assert!(record.rows.iter().filter(|row| row.input[place] << 1 != 0).count() > 10_000);
 }

@@ -1,5 +1,5 @@
-//! `specgen panel` between pages and the real-time program on a simulated machine. Pages are made up here, byte by byte, but for the
-//! one that a real browser draws ([`browser`]).
+//! `specgen panel` between pages and the real-time program on a simulated machine. Pages are simulated here by their bytes, except one
+//! in a real browser ([`browser`]).
 
 use std::fs;
 use std::io::{BufRead, BufReader, Write};
@@ -20,14 +20,14 @@ use tungstenite::client::IntoClientRequest;
 use tungstenite::{Message, WebSocket};
 
 use super::host::Host;
-use super::{Bench, HOLDING, LINK_LOST, Record, Running, signal, wait_for};
+use super::{Bench, HOLDING, LINK_LOST, ProcessGuard, Record, signal, wait_for};
 
 mod browser;
 
-/// How long anything may take on a computer that others use.
+/// Timeout on a loaded computer.
 const LONG: Duration = Duration::from_secs(60);
 
-/// The panel, at a port of its own.
+/// The panel, at a separate port.
 pub struct Panel {
     process: Option<Child>,
     pub address: String,
@@ -42,7 +42,7 @@ impl Panel {
         let mut said = BufReader::new(process.stderr.take().unwrap()).lines();
         let printed =
             said.find_map(|line| line.unwrap().split_once("panel at http://").map(|(_, rest)| rest.to_owned()));
-        // What it says later it must not wait for.
+        // Read its later output, so that it does not block.
         std::thread::spawn(move || said.map_while(Result::ok).for_each(|line| println!("panel: {line}")));
         let printed = printed.expect("it says where it is");
         let (address, token) = printed.split_once("/?token=").unwrap();
@@ -53,7 +53,7 @@ impl Panel {
         format!("http://{}/?token={}", self.address, self.token)
     }
 
-    /// The answer to a request, as it came.
+    /// The raw answer to a request.
     pub fn get(&self, path: &str, fields: &str) -> String {
         let mut stream = TcpStream::connect(&self.address).unwrap();
         stream.set_read_timeout(Some(LONG)).unwrap();
@@ -70,7 +70,7 @@ impl Panel {
         Page { socket, state: Value::Null, events: Vec::new(), ticks: None, gap: 0, asked: 0 }
     }
 
-    /// As Ctrl-C does.
+    /// Ends it like Ctrl-C.
     pub fn end(mut self) {
         let mut process = self.process.take().unwrap();
         signal(&process, Signal::INT);
@@ -87,12 +87,12 @@ impl Drop for Panel {
     }
 }
 
-/// A page as the script of the real one talks.
+/// A page with the protocol of the real one.
 pub struct Page {
     socket: WebSocket<TcpStream>,
     state: Value,
     events: Vec<String>,
-    /// The tick that the next row begins with, and ticks that were missing.
+    /// First tick of the next row, and number of missing ticks.
     ticks: Option<u64>,
     gap: u64,
     asked: u64,
@@ -103,7 +103,7 @@ impl Page {
         self.socket.send(Message::text(what.to_string())).unwrap();
     }
 
-    /// Takes one message; what it was if it was an answer or a record.
+    /// Takes one message, and returns it if it is an answer or a record.
     fn hear(&mut self) -> Option<Message> {
         let message = self.socket.read().unwrap();
         match &message {
@@ -202,7 +202,7 @@ impl Page {
 }
 
 /// A program on the simulated machine, at a link.
-fn program(bench: &Bench, name: &str, plant: &str, link: &Path) -> Running {
+fn program(bench: &Bench, name: &str, plant: &str, link: &Path) -> ProcessGuard {
     let mut command = Command::new(&bench.programs.binary);
     command.args([
         "--sim",
@@ -216,7 +216,7 @@ fn program(bench: &Bench, name: &str, plant: &str, link: &Path) -> Running {
         "1000",
     ]);
     command.arg("--record").arg(bench.path(name)).arg("--link").arg(link);
-    let running = Running::new(&mut command);
+    let running = ProcessGuard::new(&mut command);
     wait_for("the link", || link.exists());
     running
 }
@@ -235,7 +235,7 @@ fn pages_operate_a_machine_one_is_in_control_and_a_page_that_leaves_is_a_host_th
     first.takes_control();
     first.runs();
 
-    // The other looks; hold works from there, moving does not, and control comes when nobody answers in ten seconds or at once.
+    // The other page watches: hold works, moving does not, and it gets control if it is granted, or not answered within ten seconds.
     let mut second = panel.page();
     second.wait("another page in control", |state| state["holder"] == "page 1" || state["holder"].is_string());
     second.refused(json!({ "do": "command", "line": "jog x=100nm" }), "is not in control");
@@ -247,7 +247,7 @@ fn pages_operate_a_machine_one_is_in_control_and_a_page_that_leaves_is_a_host_th
     first.phase("running");
     drop(second);
 
-    // What is unstable is not sent; what is no command does nothing.
+    // Unstable gains are not sent; invalid commands have no effect.
     let answer = first.command(json!({ "do": "gain", "factor": 30.0 }));
     assert!(answer["ok"] == false && answer["why"].as_str().unwrap().starts_with("not sent: E"), "{answer}");
     let gains = first.done(json!({ "do": "gain", "factor": 0.5 }));
@@ -262,7 +262,7 @@ fn pages_operate_a_machine_one_is_in_control_and_a_page_that_leaves_is_a_host_th
     first.refused(json!({ "do": "wave", "name": "w", "text": "ramp = 1" }), "axis");
     first.done(json!({ "do": "command", "line": "goto zero" }));
     first.done(json!({ "do": "command", "line": "record arm 500" }));
-    // It begins at its center.
+    // It starts at its center.
     let start = Instant::now();
     while first.command(json!({ "do": "wave", "name": "small.toml", "text": wave }))["ok"] == false {
         assert!(start.elapsed() < LONG, "no wave: {:#}", first.state);
@@ -276,7 +276,7 @@ fn pages_operate_a_machine_one_is_in_control_and_a_page_that_leaves_is_a_host_th
             break bytes[4..].to_vec();
         }
     };
-    // Every tick was in a row, or it was told that it was not.
+    // Every tick was in a row, or reported as missing.
     assert!(first.gap == 0 || first.events.iter().any(|text| text.contains("were lost")), "{} ticks", first.gap);
     let record = Record::new(bytes);
     let replay = record.replay(&mut bench.machine());
@@ -291,14 +291,14 @@ fn pages_operate_a_machine_one_is_in_control_and_a_page_that_leaves_is_a_host_th
     first.wait("without them", |state| state["mine"] == false);
     drop(second);
     first.wait("left alone", |state| state["k"] == "left");
-    // Its time may be slower than that of pages: somebody else looks until it has missed its host.
+    // Its time may be slower than that of pages: another host polls until the machine has lost its host.
     let mut watcher = Host::open(&link, 1).unwrap();
     let is_lost = |status: &Status| (status.phase, status.cause) == (HOLDING, LINK_LOST);
     watcher.wait("the loss", is_lost);
     first.takes_control();
     first.wait("held for the lost host", |state| state["status"]["phase"] == HOLDING);
     assert_eq!(first.state["said"]["what"], "Holding. The host was silent.");
-    // A page that says nothing any more is gone, too.
+    // A silent page also counts as gone.
     first.done(json!({ "do": "begin", "request": "run" }));
     first.phase("running");
     let mut third = panel.page();
@@ -331,19 +331,19 @@ fn nobody_gets_in_without_the_token_or_from_elsewhere(panel: &Panel) {
     for origin in ["", "Origin: http://evil.example\r\n", "Origin: null\r\n"] {
         assert_eq!(status(&panel.get(&socket, &format!("{fields}{origin}"))), "403", "{origin}");
     }
-    // By a name that leads here, as after a rebinding.
+    // By a host name, as after DNS rebinding.
     let mut stream = TcpStream::connect(&panel.address).unwrap();
     write!(stream, "GET {with} HTTP/1.1\r\nHost: evil.example\r\n\r\n").unwrap();
     assert_eq!(status(&std::io::read_to_string(stream).unwrap()), "421");
 }
 
 fn garbage_disturbs_nothing(panel: &Panel, page: &mut Page) {
-    // Bytes that are no HTTP, a head without end, a head that is too long.
+    // Invalid HTTP, a head without end, a head that is too long.
     for bytes in [&b"\x00\xff\x13\x37\r\n\r\n"[..], b"GET / HTTP/1.1\r\n", &[b'x'; 20_000]] {
         let mut stream = TcpStream::connect(&panel.address).unwrap();
         let _ = stream.write_all(bytes);
     }
-    // Frames that are none, texts that are no commands, numbers beyond what was sent, a message that is too long.
+    // Invalid frames, texts that are not commands, numbers that were not sent yet, a message that is too long.
     let mut stranger = panel.page();
     for text in [
         "",
@@ -359,7 +359,7 @@ fn garbage_disturbs_nothing(panel: &Panel, page: &mut Page) {
     let _ = stranger.socket.send(Message::text("x".repeat(100_000)));
     let mut stranger = panel.page();
     let _ = stranger.socket.get_mut().write_all(&[0xff; 4096]);
-    // A browser that takes nothing.
+    // A browser that reads nothing.
     let idle = panel.page();
     let before = page.state["status"]["tick"].as_u64().unwrap();
     page.wait("ticks meanwhile", |state| state["status"]["tick"].as_u64().unwrap() > before + 5_000);
@@ -367,13 +367,13 @@ fn garbage_disturbs_nothing(panel: &Panel, page: &mut Page) {
     drop((stranger, idle));
 }
 
-/// A machine whose plant is another spec's, as if cables were exchanged.
-struct Exchanged {
+/// A machine with the plant of another spec, as if cables were swapped.
+struct MiswiredMachine {
     stop: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,
 }
 
-impl Exchanged {
+impl MiswiredMachine {
     fn new(spec: &Path, digest: &str, name: &str) -> Self {
         let compiled = compile::compile(spec).unwrap_or_else(|_| panic!("it compiles"));
         let task = compiled.model.task_space.as_ref().unwrap();
@@ -398,7 +398,7 @@ impl Exchanged {
     }
 }
 
-impl Drop for Exchanged {
+impl Drop for MiswiredMachine {
     fn drop(&mut self) {
         self.stop.store(true, Ordering::Relaxed);
         if let Some(thread) = self.thread.take() {
@@ -412,7 +412,7 @@ fn the_wiring_check_names_gauges_that_are_exchanged_or_turned_and_lets_a_good_ma
     let bench = Bench::named("reference.toml", "check");
     let text = fs::read_to_string(&bench.spec).unwrap();
     let digest = compile::compile(&bench.spec).unwrap_or_else(|_| panic!("it compiles")).ir.digest;
-    // The machine has gauges 3 and 5 exchanged.
+    // Gauges 3 and 5 of the machine are swapped.
     let [three, five] = [
         "point     = [\"80 mm\", \"0 mm\", \"180 mm\"]\ndirection = [0, 1, 0]",
         "point     = [\"0 mm\", \"80 mm\", \"180 mm\"]\ndirection = [1, 0, 0]",
@@ -425,14 +425,14 @@ fn the_wiring_check_names_gauges_that_are_exchanged_or_turned_and_lets_a_good_ma
     let records = bench.spec.with_file_name("records");
     fs::create_dir(bench.path("records")).unwrap();
     fs::copy(records.join("reference-forc.csv"), bench.path("records/reference-forc.csv")).unwrap();
-    // In the short run those that are exchanged.
+    // In the short run, only the swapped ones.
     let tried = crate::support::length(1..2, 0..3);
     for (number, (spec, expected)) in cases.into_iter().enumerate().filter(|(number, _)| tried.contains(number)) {
         assert!(number == 0 || *spec != text, "the spec is another");
         let path = bench.path(&format!("check-{number}.toml"));
         fs::write(&path, spec).unwrap();
         let name = format!("check-{number}-{}", std::process::id());
-        let plant = Exchanged::new(&path, &digest, &name);
+        let plant = MiswiredMachine::new(&path, &digest, &name);
         let link = bench.path(&format!("check{number}.link"));
         let running = program(&bench, &format!("check{number}.rec"), &name, &link);
         let panel = Panel::new(&bench.spec, &link);

@@ -1,5 +1,5 @@
-//! Hosts that look on: samples are what the record of the same run says, each host has its own, and one that does not read is no
-//! burden to anybody.
+//! Hosts that watch: samples match the record of the same run, each host has its own stream, and one that does not read disturbs
+//! nobody.
 
 use host_sim::controller::TickController;
 use std::collections::BTreeMap;
@@ -16,7 +16,7 @@ use specgen_link::Refusal;
 use specgen_link::client::{ClientError, Timeout};
 use specgen_link::samples::MOST_EVERY;
 
-use super::{Bench, Running, wait_for};
+use super::{Bench, ProcessGuard, wait_for};
 
 /// Values of a tick in the record: status, phase, pose, set-point, voltages.
 type TickValues = (u32, u8, [[f64; 6]; 3]);
@@ -38,7 +38,7 @@ fn shown(bench: &Bench, bytes: &[u8]) -> BTreeMap<u64, TickValues> {
     all
 }
 
-/// Least and most to the bit, the mean to two roundings of the largest.
+/// Minimum and maximum exactly, the mean within two roundings of the largest value.
 fn check_spread(found: &Spread, values: impl Iterator<Item = f64>) {
     let values: Vec<f32> = values.map(|value| value as f32).collect();
     let mean = values.iter().map(|value| f64::from(*value)).sum::<f64>() / values.len() as f64;
@@ -49,7 +49,7 @@ fn check_spread(found: &Spread, values: impl Iterator<Item = f64>) {
     assert!((f64::from(found.mean) - mean).abs() <= 2.0 * f64::from(f32::EPSILON) * largest, "{found:?} {mean}");
 }
 
-/// A row against the ticks of the record.
+/// Compares a row with the ticks of the record.
 fn check_row(row: &Row, tick: u64, every: u32, shown: &BTreeMap<u64, TickValues>, motion: &Motion) {
     let ticks: Vec<&TickValues> = (tick..tick + u64::from(every)).map(|tick| &shown[&tick]).collect();
     let (_, phase, [pose, target, _]) = ticks[ticks.len() - 1];
@@ -65,12 +65,12 @@ fn check_row(row: &Row, tick: u64, every: u32, shown: &BTreeMap<u64, TickValues>
     }
 }
 
-/// With time that waits, so that it runs on any computer.
+/// With elastic time, so that it runs on any computer.
 pub fn hosts_look_on_and_are_no_burden(bench: &Bench) {
     let link = bench.path("samples.link");
     let mut command = bench.command("samples.rec");
     command.args(["--elastic", "--sim-timeout", "5000", "--link-silence", "1000", "--link"]).arg(&link);
-    let running = Running::new(&mut command);
+    let running = ProcessGuard::new(&mut command);
     wait_for("the link", || link.exists());
     let open = || Session::open(SocketLine::open(&link).unwrap(), Timeout::PIPE, None).map_err(|_| ()).unwrap();
 
@@ -82,7 +82,7 @@ pub fn hosts_look_on_and_are_no_burden(bench: &Bench) {
     stalled.stream(1).unwrap();
     let begun = one.poll().unwrap().tick;
 
-    // A third one moves the machine, and writes what it sees.
+    // A third host moves the machine, and writes its samples to a file.
     let orders = [
         "arm",
         "wait holding",
@@ -99,7 +99,7 @@ pub fn hosts_look_on_and_are_no_burden(bench: &Bench) {
     command.arg("--socket").arg(&link).current_dir(bench.folder.path());
     let mut operate = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
     let mut blocks: Vec<Block> = Vec::new();
-    // What waits for one that does not read are 1023 blocks of nine ticks.
+    // The queue of a host that does not read has 1023 blocks of nine ticks.
     let mut ages = Vec::new();
     while operate.try_wait().unwrap().is_none() || one.poll().unwrap().tick < begun + 10_000 {
         blocks.extend(one.take_blocks().unwrap());
@@ -116,7 +116,7 @@ pub fn hosts_look_on_and_are_no_burden(bench: &Bench) {
     let (summary, record) = bench.check(&output, "samples.rec");
     let shown = shown(bench, &record.bytes);
 
-    // The one that read has every tick once; what another one left lying did not cost it any.
+    // The host that reads has every tick once, whatever another host left unread.
     let lost = summary["lost_rows"].as_u64().unwrap();
     let mut rows = 0;
     for pair in blocks.windows(2) {
@@ -132,9 +132,9 @@ pub fn hosts_look_on_and_are_no_burden(bench: &Bench) {
     }
     assert!(rows * 37 > 10_000 && blocks[0].number == 0, "{rows} rows");
 
-    // The one that did not has lost the oldest, and sees how many.
+    // The other host has lost the oldest blocks, and knows how many.
     assert!(late[0].number > 0 && late.len() > 200, "{} {}", late[0].number, late.len());
-    // While it takes what is left, it may lose more.
+    // It may lose more while it reads the rest.
     assert!(late.windows(2).all(|pair| pair[1].number > pair[0].number));
     for block in &late {
         let ticks = block.tick..;
@@ -152,7 +152,7 @@ pub fn hosts_look_on_and_are_no_burden(bench: &Bench) {
         late[0].number
     );
 
-    // Files and the document say the same.
+    // Files and the JSON document agree.
     let text = std::fs::read_to_string(bench.path("w.csv")).unwrap();
     let titles: Vec<&str> = text.lines().next().unwrap().split(',').collect();
     let column = |name: &str| titles.iter().position(|title| *title == name).unwrap();

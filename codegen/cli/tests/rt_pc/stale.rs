@@ -1,4 +1,4 @@
-//! A machine whose gauges are not read any more: nothing that was measured before is said to be so now.
+//! A machine whose gauges are no longer read: old measurements are not shown as current.
 
 use std::process::Command;
 use std::time::Duration;
@@ -6,9 +6,9 @@ use std::time::Duration;
 use rustix::process::Signal;
 use serde_json::Value;
 
-use super::{Bench, Running, signal, wait_for};
+use super::{Bench, ProcessGuard, signal, wait_for};
 
-/// Disarmed, for then a converter that is silent faults nothing. Its record replays to the bit, with gauges that are no numbers in it.
+/// Disarmed, because then a silent converter causes no fault. Its record, which contains NaN gauges, replays bit for bit.
 #[test]
 #[ignore = "long: another session"]
 fn a_pose_that_is_not_measured_is_not_shown_as_that_of_now() {
@@ -16,7 +16,7 @@ fn a_pose_that_is_not_measured_is_not_shown_as_that_of_now() {
     let link = bench.path("stale.link");
     let mut command = bench.command("stale.rec");
     command.args(["--elastic", "--sim-timeout", "1500", "--link-silence", "5000", "--link"]).arg(&link);
-    let running = Running::new(&mut command);
+    let running = ProcessGuard::new(&mut command);
     wait_for("the link", || link.exists());
     let operate = |more: &[&str]| {
         let mut command = Command::new(env!("CARGO_BIN_EXE_specgen"));
@@ -29,18 +29,18 @@ fn a_pose_that_is_not_measured_is_not_shown_as_that_of_now() {
         let document: Value = serde_json::from_str(&operate(&["--json", "where"])).unwrap();
         document["result"]["answers"][0]["answer"].clone()
     };
-    // At first no tick has been made.
+    // At first there was no tick.
     wait_for("a pose", || place()["pose"].is_array());
-    // On a busy computer ticks pause for a while now and then, which is then said.
+    // On a busy computer ticks may pause, which is then reported.
     wait_for("a text with the pose", || !operate(&["where", "status"]).contains("pose not measured:"));
 
     signal(&bench.plant, Signal::STOP);
     std::thread::sleep(Duration::from_millis(800));
-    // The reading is waited for: no tick is made.
+    // While it waits for the reading, there is no tick.
     let text = operate(&["where", "status"]);
     assert!(text.contains("not measured: no tick for") && text.contains(" s ago"), "{text}");
     assert!(text.contains("voltages unknown") && text.contains("this is its state"), "{text}");
-    // Then ticks are made without it.
+    // Then ticks continue without it.
     wait_for("ticks", || place()["why"] == "the gauges are not read");
     let found = place();
     assert!(found["pose"].is_null() && found["error"].is_null() && found["voltage"].is_null(), "{found}");

@@ -1,4 +1,4 @@
-//! A stop is a stop: whoever gives it, in whatever phase, what any client had sent before it is not done any more.
+//! A stop discards all earlier commands of all clients, whichever client sends it and in whatever phase.
 
 use std::io::{self, Read, Write};
 use std::net::TcpStream;
@@ -18,27 +18,27 @@ use specgen_link::{Bytes, CostUnit, Device, Endpoint, Identity, Refusal, Reply, 
 use super::gcs::{self, Bridge};
 use super::host::Host;
 use super::panel::Panel;
-use super::{ARM, BUSY, Bench, DISARMED, HOLD, HOLDING, NONE, RAMP_DOWN, RUN, RUNNING, Running, wait_for};
+use super::{ARM, BUSY, Bench, DISARMED, HOLD, HOLDING, NONE, ProcessGuard, RAMP_DOWN, RUN, RUNNING, wait_for};
 use crate::support::length;
 
 const ARMING: u8 = 1;
 /// A platform's word to move.
 const MOVE: u64 = 2;
-/// What a stop may take, on a loaded computer whose machine waits for it.
+/// Largest duration of a stop, on a loaded computer with elastic time.
 const RAMP: Duration = Duration::from_millis(500);
-/// Ticks without motion after which it stands.
+/// Ticks without motion after which it is at rest.
 const STILL: u64 = 300;
-/// How long it then has to stand.
-fn stands() -> Duration {
+/// How long it must then stay at rest.
+fn rest_time() -> Duration {
     Duration::from_millis(length(200, 1500))
 }
-/// How far a platform comes while it stops, m: a stop at full speed, many times over.
+/// Largest motion during a stop, m: many times that of a stop from full speed.
 const STOPPING: f64 = 3e-6;
 
 /// The machine as another host sees it.
-struct Look(Session<SocketLine>);
+struct Observer(Session<SocketLine>);
 
-impl Look {
+impl Observer {
     fn new(link: &Path) -> Self {
         Self(Session::open(SocketLine::open(link).unwrap(), Timeout::SOCKET, None).unwrap())
     }
@@ -51,9 +51,9 @@ impl Look {
         wait_for(what, || there(&self.now()));
     }
 
-    /// After a stop: at most a stopping ramp, and then nothing.
+    /// Asserts that after a stop there is at most a stopping ramp, and then no motion.
     #[track_caller]
-    fn stands(&mut self, what: &str) {
+    fn assert_at_rest(&mut self, what: &str) {
         let way =
             |a: &Place, b: &Place| a.target.iter().zip(&b.target).fold(0.0, |way: f64, (a, b)| way.max((a - b).abs()));
         let (mut start, begun) = (Instant::now(), self.now());
@@ -69,7 +69,7 @@ impl Look {
         }
         assert!(way(&begun, &rest) < STOPPING, "{what}: {begun:?} {rest:?}");
         start = Instant::now();
-        while start.elapsed() < stands() {
+        while start.elapsed() < rest_time() {
             let now = self.now();
             assert!(
                 way(&rest, &now) < 1e-12,
@@ -87,38 +87,38 @@ fn a_stop_is_a_stop() {
     let link = bench.path("stops.link");
     let mut command = bench.command("stops.rec");
     command.args(["--elastic", "--sim-timeout", "5000", "--link-silence", "20000", "--link"]).arg(&link);
-    let running = Running::new(&mut command);
+    let running = ProcessGuard::new(&mut command);
     wait_for("the link", || link.exists());
-    let mut look = Look::new(&link);
+    let mut observer = Observer::new(&link);
 
-    // In the short run one of each: a host of the link, a client of the bridge as the machine comes up, and behind moves.
+    // In the short run, one of each: a host of the link, a client of the bridge during start-up, and after queued moves.
     let whole = length(false, true);
-    hosts_of_the_link(&link, &mut look);
+    hosts_of_the_link(&link, &mut observer);
     if whole {
-        scripts(&bench, &link, &mut look);
+        scripts(&bench, &link, &mut observer);
         println!("scripts: stopped");
     }
     let bridge = Bridge::new_at(&bench, "stops.link", &[]);
-    while_the_machine_comes_up(&bridge, &mut look);
+    stops_during_start_up(&bridge, &mut observer);
     if whole {
-        the_servo_off_and_on_again(&bridge, &mut look);
+        servo_off_and_on_again(&bridge, &mut observer);
     }
-    behind_moves_that_nobody_has_read(&bridge, &mut look);
+    a_stop_overtakes_unread_moves(&bridge, &mut observer);
     if whole {
-        by_another_host(&bridge, &link, &mut look);
-        crowds(&bridge, &mut look);
+        by_another_host(&bridge, &link, &mut observer);
+        many_clients(&bridge, &mut observer);
     }
     bridge.end();
     if whole {
-        pages(&bench, &link, &mut look);
+        pages(&bench, &link, &mut observer);
     }
-    drop(look);
+    drop(observer);
     let (summary, _) = bench.check(&running.end(Signal::INT), "stops.rec");
     assert_eq!(summary["incidents"], json!([]), "{summary:#}");
 }
 
-/// Set-points that were sent before the machine stopped running, by whatever, are not followed when it runs again.
-fn hosts_of_the_link(link: &Path, look: &mut Look) {
+/// Set-points that were sent before the machine stopped running, for any reason, are not followed when it runs again.
+fn hosts_of_the_link(link: &Path, observer: &mut Observer) {
     let mut host = Host::open(link, 1).unwrap();
     let moved = |x: f64| {
         let mut words = [0; 21];
@@ -138,32 +138,32 @@ fn hosts_of_the_link(link: &Path, look: &mut Look) {
     let early = moved(4e-6);
     assert_eq!(host.refused(&Request::Setpoint { words: Bytes(&early) }), Refusal::State, "before it runs");
     up(&mut host);
-    let bias = look.now().target;
+    let bias = observer.now().target;
     assert!(bias[0].abs() < 1e-12, "{bias:?}");
     for (stop, phase) in [(HOLD, HOLDING), (RAMP_DOWN, DISARMED)] {
         let words = moved(-6e-6);
         host.done(&Request::Setpoint { words: Bytes(&words) });
-        // In mid-move, or when it has arrived.
+        // During a move, or after arrival.
         host.wait("the motion", |status| status.status & BUSY == 0 || stop == HOLD);
         host.done(&Request::Supervise { request: stop });
         host.wait("the stop", |status| status.phase == phase);
         if stop == HOLD {
-            look.stands("held over the link");
-            let before = look.now().target;
+            observer.assert_at_rest("held over the link");
+            let before = observer.now().target;
             host.done(&Request::Supervise { request: RUN });
             host.wait("running", |status| status.phase == RUNNING);
-            look.stands("run after a hold");
-            assert!((look.now().target[0] - before[0]).abs() < 1e-9);
+            observer.assert_at_rest("run after a hold");
+            assert!((observer.now().target[0] - before[0]).abs() < 1e-9);
         } else {
             up(&mut host);
-            look.stands("run after a ramp down");
-            assert!(look.now().target[0].abs() < 1e-12, "an old target: {:?}", look.now());
+            observer.assert_at_rest("run after a ramp down");
+            assert!(observer.now().target[0].abs() < 1e-12, "an old target: {:?}", observer.now());
         }
     }
     host.done(&Request::Supervise { request: RAMP_DOWN });
     host.wait("the way down", |status| status.phase == DISARMED);
 
-    // Another host holds while this one arms: what it asks for next was on its way before.
+    // Another host holds while this one arms: its next request was already on its way.
     let mut other = Host::open(link, 2).unwrap();
     for request in [NONE, ARM] {
         host.done(&Request::Supervise { request });
@@ -171,14 +171,14 @@ fn hosts_of_the_link(link: &Path, look: &mut Look) {
     }
     other.done(&Request::Supervise { request: HOLD });
     assert_eq!(host.refused(&Request::Supervise { request: RUN }), Refusal::Busy, "it is to hear of the stop");
-    // The wiring check is broken off, and a machine that is not checked does not hold.
+    // The wiring check is aborted, and an unchecked machine does not hold.
     host.wait("the way down", |status| status.phase == DISARMED);
-    look.stands("held while it armed");
-    assert_eq!(look.now().phase, DISARMED);
+    observer.assert_at_rest("held while it armed");
+    assert_eq!(observer.now().phase, DISARMED);
     host.done(&Request::Supervise { request: NONE });
     drop(host);
 
-    // A host that does not wait for answers: what nobody has read when the other holds is not done.
+    // A host that does not wait for answers: requests that are unread when the other holds are discarded.
     let mut asks = Client::open(Paper::default(), 4, Timeout::PIPE).unwrap().0;
     let supervise = |request| Request::Supervise { request };
     let mut line = UnixStream::connect(link).unwrap();
@@ -196,13 +196,13 @@ fn hosts_of_the_link(link: &Path, look: &mut Look) {
         }
     }
     other.done(&supervise(HOLD));
-    look.stands("held before another host's request to run was read");
-    assert_eq!(look.now().phase, HOLDING);
+    observer.assert_at_rest("held before another host's request to run was read");
+    assert_eq!(observer.now().phase, HOLDING);
     other.done(&supervise(RAMP_DOWN));
     other.wait("the way down", |status| status.phase == DISARMED);
 }
 
-/// The other end of a link that does everything it is asked for: it keeps the frames.
+/// A link to a device that accepts every request, and keeps the frames.
 #[derive(Default)]
 struct Paper {
     endpoint: Endpoint,
@@ -214,7 +214,7 @@ impl Port for Paper {
     fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
         self.sent.extend(bytes);
         for byte in bytes {
-            self.answer.extend(self.endpoint.push(*byte, &mut Willing).unwrap_or_default());
+            self.answer.extend(self.endpoint.push(*byte, &mut StubDevice).unwrap_or_default());
         }
         Ok(())
     }
@@ -227,9 +227,9 @@ impl Port for Paper {
     }
 }
 
-struct Willing;
+struct StubDevice;
 
-impl Device for Willing {
+impl Device for StubDevice {
     fn execute(&mut self, request: &Request<'_>) -> Reply<'_> {
         let [config_words, input_words, output_words] = [1; 3];
         let identity =
@@ -238,10 +238,10 @@ impl Device for Willing {
     }
 }
 
-/// `operate`: what it was told to do is over when another host stops the machine, also where it waits. Lines that wait are not done.
-fn scripts(bench: &Bench, link: &Path, look: &mut Look) {
+/// `operate`: its commands end when another host stops the machine, also during a wait. Waiting lines are skipped.
+fn scripts(bench: &Bench, link: &Path, observer: &mut Observer) {
     let stop = |request, phase| {
-        // Gone again, so that it has no orders.
+        // Disconnected again, so that it is not in control.
         let mut other = Host::open(link, 5).unwrap();
         other.done(&Request::Supervise { request });
         other.wait("the stop", |status| status.phase == phase);
@@ -249,11 +249,11 @@ fn scripts(bench: &Bench, link: &Path, look: &mut Look) {
     let operate = |words: &[&str]| {
         let mut command = Command::new(env!("CARGO_BIN_EXE_specgen"));
         command.args(["operate", "--socket"]).arg(link).arg(&bench.spec).args(words).stdin(Stdio::piped());
-        Running::new(&mut command)
+        ProcessGuard::new(&mut command)
     };
     let up = ["none", "arm", "wait holding", "run", "wait arrived"];
     let script = operate(&[&up[..], &["wait 600", "jog x=5um"]].concat());
-    look.wait("its bias pose", |place| place.phase == RUNNING && place.status & BUSY == 0);
+    observer.wait("its bias pose", |place| place.phase == RUNNING && place.status & BUSY == 0);
     stop(HOLD, HOLDING);
     let output = script.wait();
     let text = String::from_utf8_lossy(&output.stderr).into_owned();
@@ -264,73 +264,73 @@ fn scripts(bench: &Bench, link: &Path, look: &mut Look) {
     let mut input = session.0.as_mut().unwrap().stdin.take().unwrap();
     let lines = format!("{}\njog x=8um\nwait arrived\njog x=-8um\nstatus\n", up.join("\n"));
     input.write_all(lines.as_bytes()).unwrap();
-    look.wait("the jog", |place| place.target[0] > 1e-6);
+    observer.wait("the jog", |place| place.target[0] > 1e-6);
     stop(HOLD, HOLDING);
-    look.stands("held while it waits");
+    observer.assert_at_rest("held while it waits");
     stop(RAMP_DOWN, DISARMED);
     drop(input);
     let output = session.wait();
     let text = String::from_utf8_lossy(&output.stdout).into_owned();
     assert!(text.contains("the machine was stopped: command skipped") && text.contains("tick"), "{text}");
 
-    // From a terminal a stop does not wait for what waits.
+    // A stop from a terminal overtakes waiting lines.
     let mut command = Command::new("script");
     let line =
         format!("{} operate --socket {} {}", env!("CARGO_BIN_EXE_specgen"), link.display(), bench.spec.display());
     command.args(["-qec", &line, "/dev/null"]).stdin(Stdio::piped());
-    let mut session = Running::new(&mut command);
+    let mut session = ProcessGuard::new(&mut command);
     let mut input = session.0.as_mut().unwrap().stdin.take().unwrap();
     input.write_all(format!("{}\nwait 600\njog x=5um\n", up.join("\n")).as_bytes()).unwrap();
-    look.wait("its bias pose", |place| place.phase == RUNNING && place.status & BUSY == 0);
+    observer.wait("its bias pose", |place| place.phase == RUNNING && place.status & BUSY == 0);
     input.write_all(b"hold\n").unwrap();
-    look.wait("the hold", |place| place.phase == HOLDING);
-    look.stands("held from the terminal");
+    observer.wait("the hold", |place| place.phase == HOLDING);
+    observer.assert_at_rest("held from the terminal");
     input.write_all(b"ramp-down\n").unwrap();
-    look.wait("the way down", |place| place.phase == DISARMED);
+    observer.wait("the way down", |place| place.phase == DISARMED);
     drop((input, session));
 }
 
-/// Every stop, from both, at several moments of arming and of the way to the bias.
-fn while_the_machine_comes_up(bridge: &Bridge, look: &mut Look) {
+/// Every kind of stop, from both, at several times during arming and the move to the bias.
+fn stops_during_start_up(bridge: &Bridge, observer: &mut Observer) {
     let (mut a, mut b) = (bridge.client(), bridge.client());
     let given = ["\u{18}", "STP\n", "HLT X\n", "\u{18}"];
     for (count, stop) in given.into_iter().enumerate().take(length(1, 4)) {
         a.send("SVO X 1\nMOV X 5\nMOV X -5 Y 2");
         match count {
-            0 => look.wait("arming", |place| place.phase == ARMING),
-            1 => look.wait("the way to the bias", |place| place.phase == RUNNING),
+            0 => observer.wait("arming", |place| place.phase == ARMING),
+            1 => observer.wait("the way to the bias", |place| place.phase == RUNNING),
             _ => {}
         }
         let who = if count == 3 { &mut a } else { &mut b };
         who.0.write_all(stop.as_bytes()).unwrap();
         assert_eq!(who.error(), "10", "{stop:?}");
-        look.stands(&format!("{stop:?} while it comes up, {count}"));
-        assert!(look.now().target[0].abs() < 1e-12, "{:?}", look.now());
+        observer.assert_at_rest(&format!("{stop:?} during start-up, {count}"));
+        assert!(observer.now().target[0].abs() < 1e-12, "{:?}", observer.now());
         if count < 3 {
             assert_eq!(a.error(), "10", "it is told that its moves were taken away");
         }
-        // And nothing of it comes back.
+        // And none of it is executed later.
         assert_eq!(a.order("SVO X 1"), "0");
         a.settle();
-        look.stands("at its bias pose");
-        assert!(look.now().phase == RUNNING && look.now().target[0].abs() < 1e-12, "{:?}", look.now());
+        observer.assert_at_rest("at its bias pose");
+        assert!(observer.now().phase == RUNNING && observer.now().target[0].abs() < 1e-12, "{:?}", observer.now());
         assert_eq!(a.order("SVO X 0"), "0");
-        look.wait("the way down", |place| place.phase == DISARMED);
+        observer.wait("the way down", |place| place.phase == DISARMED);
     }
 }
 
-fn the_servo_off_and_on_again(bridge: &Bridge, look: &mut Look) {
+fn servo_off_and_on_again(bridge: &Bridge, observer: &mut Observer) {
     let mut client = bridge.client();
     assert_eq!([client.order("SVO X 1"), client.order("MOV X -6")], ["0", "0"]);
     client.settle();
-    assert!((look.now().target[0] + 6e-6).abs() < 1e-12);
-    // Behind moves, too.
+    assert!((observer.now().target[0] + 6e-6).abs() < 1e-12);
+    // Also after queued moves.
     client.send("MOV X 4\nMOV X -4\nSVO X 0");
-    look.wait("the way down", |place| place.phase == DISARMED);
+    observer.wait("the way down", |place| place.phase == DISARMED);
     assert_eq!(client.order("SVO X 1"), "10");
     client.settle();
-    look.stands("the servo on again");
-    assert!(look.now().target[0].abs() < 1e-12, "an old target: {:?}", look.now());
+    observer.assert_at_rest("the servo on again");
+    assert!(observer.now().target[0].abs() < 1e-12, "an old target: {:?}", observer.now());
 }
 
 /// Twenty thousand moves in one piece.
@@ -338,13 +338,13 @@ fn flood() -> Vec<u8> {
     (0..20_000_u32).flat_map(|count| format!("MOV X {}\n", 3 - 6 * (count as i32 % 2)).into_bytes()).collect()
 }
 
-fn behind_moves_that_nobody_has_read(bridge: &Bridge, look: &mut Look) {
+fn a_stop_overtakes_unread_moves(bridge: &Bridge, observer: &mut Observer) {
     let mut b = bridge.client();
     let all = ["another client", "the same client", "another client, the first one gone"];
     for who in all.into_iter().take(length(1, 3)) {
         let mut a = bridge.client();
-        // One that is gone leaves the orders.
-        wait_for("the orders", || matches!(a.order("SVO X 1").as_str(), "0"));
+        // A client that disconnects gives up control.
+        wait_for("control", || matches!(a.order("SVO X 1").as_str(), "0"));
         a.settle();
         let mut bytes = flood();
         if who == "the same client" {
@@ -362,18 +362,18 @@ fn behind_moves_that_nobody_has_read(bridge: &Bridge, look: &mut Look) {
             b.error()
         };
         assert_eq!(answer, "10", "{who}");
-        look.stands(who);
-        assert_eq!(look.now().phase, RUNNING);
+        observer.assert_at_rest(who);
+        assert_eq!(observer.now().phase, RUNNING);
     }
-    // What comes after it counts.
+    // Later commands are executed.
     let mut a = bridge.client();
     a.0.write_all(&[&flood()[..], &b"\x18MOV X 2\n"[..]].concat()).unwrap();
-    wait_for("the move", || (look.now().target[0] - 2e-6).abs() < 1e-12);
+    wait_for("the move", || (observer.now().target[0] - 2e-6).abs() < 1e-12);
     assert_eq!(a.error(), "10");
 }
 
-/// A hold and a ramp down over the link: what clients of the bridge sent before is not done when the machine runs again.
-fn by_another_host(bridge: &Bridge, link: &Path, look: &mut Look) {
+/// A hold and a ramp-down over the link: earlier commands of the bridge's clients are not executed when the machine runs again.
+fn by_another_host(bridge: &Bridge, link: &Path, observer: &mut Observer) {
     let (mut a, mut host) = (bridge.client(), Host::open(link, 3).unwrap());
     for (request, phase) in [(HOLD, HOLDING), (RAMP_DOWN, DISARMED)] {
         assert_eq!(a.order("SVO X 1"), "0");
@@ -381,48 +381,48 @@ fn by_another_host(bridge: &Bridge, link: &Path, look: &mut Look) {
         a.0.write_all(&[&flood()[..], &b"SVO X 1\nMOV X 5\n"[..]].concat()).unwrap();
         host.done(&Request::Supervise { request });
         host.wait("the stop", |status| status.phase == phase);
-        look.stands("stopped by another host");
-        assert_eq!((look.now().phase, a.error().as_str()), (phase, "10"));
+        observer.assert_at_rest("stopped by another host");
+        assert_eq!((observer.now().phase, a.error().as_str()), (phase, "10"));
         assert_eq!(a.order("SVO X 1"), "0");
         a.settle();
-        let before = look.now();
-        look.stands("run again");
+        let before = observer.now();
+        observer.assert_at_rest("run again");
         assert!(before.phase == RUNNING && (phase == HOLDING || before.target[0].abs() < 1e-12), "{before:?}");
     }
-    // While it comes up.
+    // During start-up.
     assert_eq!(a.order("SVO X 0"), "0");
-    look.wait("the way down", |place| place.phase == DISARMED);
+    observer.wait("the way down", |place| place.phase == DISARMED);
     a.send("SVO X 1\nMOV X 5");
-    look.wait("arming", |place| place.phase == ARMING);
+    observer.wait("arming", |place| place.phase == ARMING);
     host.done(&Request::Supervise { request: HOLD });
-    look.stands("held while it armed");
-    assert!(look.now().phase != RUNNING, "{:?}", look.now());
+    observer.assert_at_rest("held while it armed");
+    assert!(observer.now().phase != RUNNING, "{:?}", observer.now());
     assert_eq!(a.order("SVO X 0"), "10");
-    look.wait("the way down", |place| place.phase == DISARMED);
+    observer.wait("the way down", |place| place.phase == DISARMED);
 }
 
-/// Clients that keep every place: the next one may stop the machine, and gets a place of one that has long been silent.
-fn crowds(bridge: &Bridge, look: &mut Look) {
+/// Clients that occupy all places: the next one may stop the machine, and replaces one that has long been silent.
+fn many_clients(bridge: &Bridge, observer: &mut Observer) {
     let mut a = bridge.client();
-    wait_for("the orders", || matches!(a.order("SVO X 1").as_str(), "0"));
+    wait_for("control", || matches!(a.order("SVO X 1").as_str(), "0"));
     assert_eq!(a.order("MOV Z 15"), "0");
     a.settle();
     let silent: Vec<gcs::Client> = (0..40).map(|_| bridge.client()).collect();
     a.send("MOV X 30");
-    look.wait("the motion in a crowd", |place| place.target[0] > 4e-6);
+    observer.wait("the motion in a crowd", |place| place.target[0] > 4e-6);
     let mut stopper = bridge.client();
     stopper.0.write_all(&[24]).unwrap();
     assert_eq!(stopper.error(), "10");
-    look.stands("from a client for whom there is no room");
-    assert!(look.now().target[0] < 29e-6 && a.error() == "0", "the first is still there");
+    observer.assert_at_rest("stopped by a client over the limit");
+    assert!(observer.now().target[0] < 29e-6 && a.error() == "0", "the first is still there");
     wait_for("a place", || bridge.client().order("HLP") == "2");
     drop(silent);
     assert_eq!(a.order("SVO X 0"), "0");
-    look.wait("the way down", |place| place.phase == DISARMED);
+    observer.wait("the way down", |place| place.phase == DISARMED);
 }
 
-/// Pages: a hold of one ends what another had asked for; connections without the token keep nobody out.
-fn pages(bench: &Bench, link: &Path, look: &mut Look) {
+/// Pages: a hold from one page ends the command of another; connections without the token block nobody.
+fn pages(bench: &Bench, link: &Path, observer: &mut Observer) {
     let panel = Panel::new(&bench.spec, link);
     let (mut first, mut second) = (panel.page(), panel.page());
     first.takes_control();
@@ -432,13 +432,13 @@ fn pages(bench: &Bench, link: &Path, look: &mut Look) {
     for count in 0..8 {
         first.say(&json!({ "do": "command", "line": format!("jog x={}um", 1 + count), "id": 901 + count }));
     }
-    look.wait("arming", |place| place.phase == ARMING);
+    observer.wait("arming", |place| place.phase == ARMING);
     second.say(&json!({ "do": "hold" }));
-    look.wait("the way down", |place| place.phase == DISARMED);
-    look.stands("held from another page");
-    assert_eq!(look.now().phase, DISARMED);
+    observer.wait("the way down", |place| place.phase == DISARMED);
+    observer.assert_at_rest("held from another page");
+    assert_eq!(observer.now().phase, DISARMED);
 
-    // A hundred that are slow with their heads, for ever.
+    // A hundred connections that never complete their requests.
     let over = Arc::new(AtomicBool::new(false));
     let crowd: Vec<_> = (0..100)
         .map(|_| {

@@ -1,5 +1,5 @@
-//! A machine that is wired wrongly: the real-time program refuses to run it and names the fault, for its hosts and in its summary, and
-//! the record of the checks replays to the bit.
+//! A miswired machine: the real-time program refuses to run it and names the fault, to hosts and in its summary, and the record of the
+//! checks replays bit for bit.
 
 use std::fs;
 use std::io::{BufRead, BufReader, Write};
@@ -9,7 +9,7 @@ use rustix::process::Signal;
 use specgen::lower::single_faults;
 use specgen_runtime::supervisor::{Fault, Finding};
 
-use super::{Bench, Running, wait_for};
+use super::{Bench, ProcessGuard, wait_for};
 
 const REFUSED: &str = ": faulted: wiring, ";
 
@@ -32,7 +32,7 @@ fn every_single_fault_of_gauges_and_legs_is_refused_and_named() {
     command
         .args(["--sim", &name, "--allow-no-rt", "--elastic", "--sim-timeout", "10000", "--json", "--record"])
         .arg(bench.path("wiring.rec"));
-    let running = Running::new(command.arg("--link").arg(&link));
+    let running = ProcessGuard::new(command.arg("--link").arg(&link));
     wait_for("the link", || link.exists());
     let mut operate = Command::new(env!("CARGO_BIN_EXE_specgen"));
     operate.arg("operate").arg("--socket").arg(&link).arg(&bench.spec);
@@ -49,7 +49,7 @@ fn every_single_fault_of_gauges_and_legs_is_refused_and_named() {
         assert!(line.contains("amplifiers off"), "{line}");
         order("acknowledge\nwait disarmed 60\nnone\nstatus", ": disarmed");
     }
-    // The last fault was mended.
+    // The last fault was fixed.
     order("arm\nwait holding 60\nstatus", ": holding");
     order("ramp-down\nwait disarmed 60\nstatus", ": disarmed");
     drop(host.stdin.take());
@@ -66,7 +66,7 @@ fn every_single_fault_of_gauges_and_legs_is_refused_and_named() {
     let _ = fs::remove_file(place);
 }
 
-/// Whether a text begins with the words of the fault; of a gain, with one that is as wrong.
+/// Whether a text starts with the fault; for a gain, with one of similar error.
 fn is_named(text: &str, fault: Finding) -> bool {
     let (Finding::Gauge(_, Fault::Gain(made)) | Finding::Leg(_, Fault::Gain(made))) = fault else {
         return text.starts_with(&fault.to_string());

@@ -1,4 +1,4 @@
-//! Files in another form than text in UTF-8: the line that is printed makes a new file of each, which is then taken.
+//! Files that are not UTF-8 text: the printed command converts each to a new file, which is then accepted.
 
 use std::fs;
 use std::process::Command;
@@ -11,7 +11,7 @@ fn utf16(text: &str, mark: bool, swap: bool) -> Vec<u8> {
     units.flat_map(|unit| if swap { unit.to_be_bytes() } else { unit.to_le_bytes() }).collect()
 }
 
-/// Whether the line's program is there.
+/// Whether a program is installed.
 fn is_there(program: &str) -> bool {
     let found = Command::new("sh").args(["-c", &format!("command -v {program}")]).output().unwrap().status.success();
     if !found {
@@ -38,12 +38,12 @@ fn records_in_other_forms_become_text_and_stay() {
         if !is_there(program) {
             continue;
         }
-        // One of the names each in the short run.
+        // In the short run, one name for each.
         for name in length(&NAMES[number % NAMES.len()..][..1], &NAMES) {
             let folder = Folder::new();
             let name = format!("{name}{ending}");
             folder.write(&name, &content);
-            // What is there already is not the new file.
+            // An existing file is not overwritten.
             folder.write("leg.utf8.csv", "mine");
             let before = files(&folder);
             let identify = ["--drive", "0:100", "--grid", "4"];
@@ -68,7 +68,7 @@ fn records_in_other_forms_become_text_and_stay() {
             }
         }
     }
-    // The record of a spec lies beside the spec, wherever one calls from.
+    // The record is relative to the spec, not to the current folder.
     if is_there("iconv") {
         let folder = Folder::new();
         fs::create_dir_all(folder.path("my specs/records")).unwrap();
@@ -86,7 +86,7 @@ fn records_in_other_forms_become_text_and_stay() {
     }
 }
 
-/// As gzip stores it, without packing.
+/// A gzip file with stored content.
 fn gzip(content: &[u8]) -> Vec<u8> {
     let mut packed = b"\x1f\x8b\x08\0\0\0\0\0\0\xff".to_vec();
     let mut pieces = content.chunks(65_535).peekable();

@@ -1,16 +1,16 @@
-//! What the sources of the program print that looks like a line for a shell.
+//! Finds printed texts in the sources that look like shell commands.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use crate::support::repository;
 
-/// Programs that lines begin with.
+/// Programs that commands start with.
 pub const PROGRAMS: [&str; 25] = [
     "specgen", "cargo", "rustup", "apt-get", "apt", "sudo", "python3", "pip", "iconv", "gunzip", "probe-rs", "usermod",
     "setcap", "modprobe", "cpupower", "taskset", "cat", "cc", "sh", "brew", "dnf", "chmod", "cp", "mv", "rt-pc",
 ];
-/// Sources of what is shipped, without their tests.
+/// Sources of the product, without tests.
 pub fn sources() -> Vec<PathBuf> {
     fn walk(folder: &Path, found: &mut Vec<PathBuf>) {
         for entry in fs::read_dir(folder).unwrap() {
@@ -44,7 +44,7 @@ pub fn code(text: &str) -> String {
     lines.filter(|line| !line.trim_start().starts_with("//")).collect::<Vec<_>>().join("\n")
 }
 
-/// Texts between quotes, with what a backslash stands for; a line that goes on is one.
+/// String literals, with escapes resolved and continued lines joined.
 pub fn literals(code: &str) -> Vec<String> {
     let (mut found, mut rest) = (Vec::new(), code);
     while let Some(start) = rest.find('"') {
@@ -90,7 +90,7 @@ pub fn literals(code: &str) -> Vec<String> {
     found
 }
 
-/// Lines within a text: what stands between backticks, and the text itself, if they begin with a program.
+/// Commands within a text: texts between backticks, and the text itself, if they start with a program.
 pub fn lines(text: &str) -> Vec<String> {
     let quoted = text.split('`').skip(1).step_by(2);
     let begins =
@@ -98,7 +98,7 @@ pub fn lines(text: &str) -> Vec<String> {
     quoted.chain([text]).map(str::trim).filter(begins).map(str::to_owned).collect()
 }
 
-/// Places in a source where a line is built.
+/// Number of places in a source where a command is built.
 pub fn built(code: &str) -> usize {
     ["shell::line(", "shell::on(", "shell::converted(", "shell::as_utf8("]
         .iter()
@@ -106,7 +106,7 @@ pub fn built(code: &str) -> usize {
         .sum()
 }
 
-/// What a command prints in these words is a sentence about one, not a line.
+/// Whether a text is a sentence about a command, not a command.
 pub fn is_sentence(line: &str) -> bool {
     line.contains(['<', '\n', '|']) || line.ends_with(['.', ':', ';']) || line.split(' ').count() > 14
 }

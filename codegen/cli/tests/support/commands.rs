@@ -5,14 +5,14 @@ use std::process::Command;
 
 use super::{BINARY, Run, repository};
 
-/// What a line needs that a test has not: it is parsed only. The main help explains both.
+/// Marks of lines that a test only parses; the main help explains them.
 const MARKS: [&str; 2] = ["(minutes)", "(board)"];
 
-/// A command line and where it stands.
+/// A command line and its location.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Line {
     pub place: String,
-    /// As it stands, remark included.
+    /// The line, including its comment.
     pub text: String,
     /// `specgen` and its arguments.
     pub words: Vec<String>,
@@ -34,7 +34,7 @@ impl Line {
         is_marked(&self.text)
     }
 
-    /// Why the program would not take the line; nothing if it would.
+    /// Why the program would refuse the line, if it would.
     pub fn fault(&self) -> Option<String> {
         use clap::error::ErrorKind::{DisplayHelp, DisplayVersion};
         let parsed = specgen::cli::command().try_get_matches_from(&self.words);
@@ -65,7 +65,7 @@ pub fn pages() -> Vec<String> {
 pub struct Block {
     pub language: String,
     pub body: String,
-    /// Of its first line, from 1.
+    /// Number of its first line, from 1.
     pub line: usize,
 }
 
@@ -86,7 +86,7 @@ pub fn blocks(markdown: &str) -> Vec<Block> {
     found
 }
 
-/// Runs lines by the shell in `folder`, where `specgen` is the program under test; ends at the first that fails.
+/// Runs a shell script in `folder`, with `specgen` as the program under test; stops at the first error.
 pub fn shell(folder: &Path, script: &str) -> Run {
     let programs = Path::new(BINARY).parent().map(Path::to_owned).into_iter();
     let others = std::env::var_os("PATH").unwrap_or_default();

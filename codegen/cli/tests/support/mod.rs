@@ -1,4 +1,4 @@
-//! The real binary as a user runs it: on a copy of the specs, with everything it prints looked at.
+//! Runs the real binary on a copy of the specs, and checks its output.
 
 pub mod commands;
 pub mod unprivileged;
@@ -24,11 +24,11 @@ pub fn repository() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(2).unwrap().to_owned()
 }
 
-/// A folder of its own with a copy of the example specs and their records.
+/// A temporary folder with a copy of the example specs and their records.
 pub struct Folder(tempfile::TempDir);
 
 impl Folder {
-    /// In memory in the short run, where every output is written to the disk before it counts.
+    /// In memory in the short run, because outputs are synced to the disk.
     pub fn new() -> Self {
         let memory = Path::new("/dev/shm");
         let usable = statvfs(memory).is_ok_and(|found| {
@@ -37,7 +37,7 @@ impl Folder {
         if length(usable, false) { Self::below(memory) } else { Self::on_disk() }
     }
 
-    /// On the disk, which takes its time.
+    /// On the disk, which is slower.
     pub fn on_disk() -> Self {
         Self::below(&std::env::temp_dir())
     }
@@ -117,7 +117,7 @@ impl Run {
         run
     }
 
-    /// What a process left that ended by itself.
+    /// The result of a process that was not killed.
     pub fn ended(what: &str, output: Output) -> Self {
         Self {
             code: output.status.code().unwrap_or_else(|| panic!("{what} ended by a signal: {output:?}")),
@@ -126,7 +126,7 @@ impl Run {
         }
     }
 
-    /// Runs `command`, and once standard error is as `seen` wants it, does something to the process.
+    /// Runs `command`, and calls `act` on the process once standard error satisfies `seen`.
     pub fn meanwhile(command: &mut Command, seen: impl Fn(&str) -> bool, act: impl FnOnce(u32)) -> Self {
         let mut child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
         let mut lines = BufReader::new(child.stderr.take().unwrap());
@@ -139,7 +139,7 @@ impl Run {
         Self { stderr, ..Self::ended(&format!("{command:?}"), child.wait_with_output().unwrap()) }
     }
 
-    /// The text must have failed with `code` and say all of `words` on standard error.
+    /// Asserts that the run failed with `code`, with all `words` on standard error.
     pub fn says(&self, code: i32, words: &[&str]) {
         assert_eq!(self.code, code, "{self:#?}");
         for word in words {
@@ -148,7 +148,7 @@ impl Run {
     }
 }
 
-/// What `--json` printed.
+/// The JSON document of a run.
 #[derive(Debug)]
 pub struct Document {
     pub code: i32,
@@ -156,14 +156,14 @@ pub struct Document {
 }
 
 impl Document {
-    /// Exactly one document on standard output, true to the exit code, its findings registered and documented.
+    /// Asserts one document on standard output, consistent with the exit code, with registered and documented findings.
     pub fn of(run: &Run) -> Self {
         let value: Value = serde_json::from_str(&run.stdout)
             .unwrap_or_else(|error| panic!("not one JSON document: {error}\n{}", run.stdout));
         assert_eq!(run.stderr, "", "nothing but the document is printed");
         assert_eq!(value["exit_code"], run.code);
         assert_eq!(value["error"].is_null(), run.code == 0, "{value:#}");
-        // What is judged and not good has a result, too.
+        // A failed verdict also has a result.
         assert!(run.code == 1 || value["result"].is_null() == (run.code != 0), "{value:#}");
         assert_eq!(value["specgen"], env!("CARGO_PKG_VERSION"));
         let document = Self { code: run.code, value };
@@ -222,7 +222,7 @@ pub fn listing(root: &Path) -> Listing {
     out
 }
 
-/// SHA-256 in hex, computed beside the code under test.
+/// SHA-256 in hexadecimal, computed independently of the code under test.
 pub fn digest(bytes: &[u8]) -> String {
     Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
 }
@@ -233,18 +233,18 @@ pub fn contents(root: &Path) -> BTreeMap<String, Vec<u8>> {
     files.map(|path| (path.clone(), fs::read(root.join(path)).unwrap())).collect()
 }
 
-/// Sends a signal; a bare machine has no program that does.
+/// Sends a signal, without an external program.
 #[track_caller]
 pub fn send(signal: Signal, process: u32) {
     kill_process(Pid::from_raw(process.cast_signed()).unwrap(), signal).unwrap();
 }
 
-/// How much of what only gains by length is run: the long length in the full run.
+/// Selects the short value, or the long one in the full run.
 pub fn length<T>(short: T, long: T) -> T {
     if std::env::var_os("SPECGEN_FULL").is_some() { long } else { short }
 }
 
-/// Cross compiler and emulator; none, with a line that says so, if one is missing and none is required.
+/// Cross compiler and emulator; none, with a message, if one is missing and not required.
 pub fn tools() -> Option<Tools> {
     target::found_or_skipped(target::available()).unwrap_or_else(|error| panic!("{error}"))
 }

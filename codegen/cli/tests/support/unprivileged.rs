@@ -1,4 +1,4 @@
-//! Runs the command as a user whom permissions bind, as they do not bind root.
+//! Runs the command as an unprivileged user, because permissions do not apply to root.
 
 use std::fs;
 use std::os::unix::fs::{PermissionsExt, chown};
@@ -17,9 +17,9 @@ pub struct Unprivileged {
 }
 
 impl Unprivileged {
-    /// `None`, after saying so, if we are root and cannot become anybody else. `folder` is handed over.
+    /// None, with a message, if we are root and cannot change the user. The user gets ownership of `folder`.
     pub fn owning(folder: &Folder) -> Option<Self> {
-        // The file system is asked rather than the user id: capabilities count.
+        // Tests the file system instead of the user id, because of capabilities.
         let probe = folder.path("probe");
         fs::create_dir(&probe).unwrap();
         set_mode(&probe, 0o555);
@@ -28,7 +28,7 @@ impl Unprivileged {
         if !privileged {
             return Some(Self { binary: BINARY.into(), switch: false });
         }
-        // The build folder may be closed to others.
+        // The build folder may not be accessible to others.
         let binary = folder.path("specgen");
         fs::copy(BINARY, &binary).unwrap();
         hand_over(&folder.path(""));

@@ -1,4 +1,4 @@
-//! The page in headless Chromium, driven over its DevTools: four states, their pictures, and nothing in the console.
+//! The page in headless Chromium, controlled over DevTools: four states with screenshots, and no console messages.
 
 use std::fs;
 use std::io::{BufRead, BufReader, Read, Write};
@@ -13,7 +13,7 @@ use tungstenite::{Message, WebSocket};
 use super::{LONG, Panel};
 use crate::support;
 
-/// Folder in which the pictures stay, where they are to be looked at.
+/// Variable with a folder for screenshots.
 const PICTURES: &str = "SPECGEN_PICTURES";
 
 /// A window.
@@ -22,7 +22,7 @@ struct Window {
     socket: WebSocket<TcpStream>,
     _profile: tempfile::TempDir,
     asked: u64,
-    /// What the console said, exceptions included.
+    /// Console messages, including exceptions.
     console: Vec<String>,
 }
 
@@ -50,7 +50,7 @@ impl Window {
         stream.set_read_timeout(Some(LONG)).unwrap();
         write!(stream, "GET /json HTTP/1.1\r\nHost: {at}\r\nConnection: close\r\n\r\n").unwrap();
         let mut bytes = Vec::new();
-        // It says how long the list is, and may keep the connection.
+        // Read by Content-Length, because the connection may stay open.
         let list: Value = loop {
             let mut part = [0; 4096];
             let count = stream.read(&mut part).unwrap();
@@ -108,7 +108,7 @@ impl Window {
         result["result"]["value"].clone()
     }
 
-    /// Until it is so; a page that is not there yet has nothing to ask for.
+    /// Waits for a condition; a page that is not loaded yet does not fulfil it.
     #[track_caller]
     fn wait(&mut self, condition: &str) {
         let start = Instant::now();
@@ -119,7 +119,7 @@ impl Window {
         }
     }
 
-    /// A browser that gets no processor for a while has them no more: it asks until it is told that it has them.
+    /// Requests control until it has it: a browser that was starved of processor time may lose it.
     fn takes_control(&mut self) {
         self.wait(
             "document.getElementById('holder').textContent.startsWith('this page') || (document.getElementById('control').click(), false)",
@@ -130,7 +130,7 @@ impl Window {
         self.value(&format!("document.getElementById('{id}').click()"));
     }
 
-    /// Presses for a second and a little.
+    /// Presses for slightly more than a second.
     fn press(&mut self, id: &str) {
         self.wait(&format!("!document.getElementById('{id}').disabled"));
         self.value(&format!(
@@ -147,7 +147,7 @@ impl Window {
         }
     }
 
-    /// Whatever it was, nothing went wrong in the page.
+    /// Asserts that there were no errors in the page.
     fn sound(mut self) {
         assert_eq!(self.value("document.documentElement.dataset.errors"), "0", "the page's own count of errors");
         assert_eq!(self.console, Vec::<String>::new(), "console");
@@ -197,7 +197,7 @@ pub fn a_browser_draws_it(panel: &Panel) {
     page.wait("document.getElementById('message').textContent.includes('Nothing to do')");
     page.value("document.querySelector('#jog button').click()");
     page.wait("document.getElementById('events').textContent.includes('jog y=100nm')");
-    // What a hand feels for: the figures have moved with it, and digits and strips with the machine.
+    // Values, drawing and strip charts follow the machine.
     page.wait("/\\d/.test(document.querySelector('#readout .pose').textContent)");
     page.wait("document.querySelector('#spectrum svg') !== null");
     page.picture("running-dark");
@@ -212,7 +212,7 @@ pub fn a_browser_draws_it(panel: &Panel) {
     other.wait("document.getElementById('arm').disabled && !document.getElementById('hold').disabled");
     other.wait("Number(document.documentElement.dataset.shown) > 40");
     other.picture("watching-light");
-    // Control changes hands.
+    // Control is handed over.
     other.click("control");
     page.wait("document.getElementById('message').textContent.includes('requests control')");
     page.click("control");
@@ -225,7 +225,7 @@ pub fn a_browser_draws_it(panel: &Panel) {
             ["shownMean", "shownMost"].map(|key| window.value(&format!("document.documentElement.dataset.{key}")));
         println!("from the panel to the screen: {mean} ms in the mean, {most} ms at most");
     }
-    // Key Esc ramps down from the page that looks.
+    // Esc ramps down from the watching page.
     page.value("document.dispatchEvent(new KeyboardEvent('keydown', { key: 'Escape', bubbles: true }))");
     page.wait(&chip("disarmed"));
     page.sound();
