@@ -4,8 +4,8 @@ use std::f64::consts::{PI, TAU};
 use std::fmt::Write as _;
 
 use crate::identify_support::{expect, generator, normal};
-use specgen::identify::response::{ResponseReport, respond_text};
-use specgen::identify::{Record, gauge, linear, parse_record, stiffness};
+use specgen::identify::response::{FrequencyResponse, respond};
+use specgen::identify::{Input, Record, gauge, linear, parse_record, stiffness};
 
 fn csv<const N: usize>(header: &str, rows: &[[f64; N]]) -> String {
     rows.iter().fold(format!("{header}\n"), |mut text, row| {
@@ -201,7 +201,7 @@ fn record(leg: &Leg, drive: impl Fn(f64) -> f64, samples: usize, noise: f64) -> 
     csv("time_s,drive_V,displacement_um", &rows)
 }
 
-fn agrees(report: &ResponseReport, leg: &Leg, loose: f64) {
+fn agrees(report: &FrequencyResponse, leg: &Leg, loose: f64) {
     let f = &report.fitted;
     println!("{f:?} misfit {:.3} %", report.misfit_percent);
     let near = |found: f64, true_: f64, share: f64| {
@@ -217,11 +217,11 @@ fn agrees(report: &ResponseReport, leg: &Leg, loose: f64) {
 
 #[test]
 fn a_swept_sine_gives_resonance_damping_lag_and_dead_time() {
-    let report = respond_text(&record(&LEG, sweep(3000.0, 12.0), 120_000, 0.002), "sweep.csv", None).unwrap();
-    assert!(report.coherence > 0.99, "{}", report.coherence);
-    agrees(&report, &LEG, 1.0);
+    let report = respond(Input::Text(&record(&LEG, sweep(3000.0, 12.0), 120_000, 0.002)), "sweep.csv", None).unwrap();
+    assert!(report.value.coherence > 0.99, "{}", report.value.coherence);
+    agrees(&report.value, &LEG, 1.0);
     // The errors are honest: the truth lies within five of them (and of a per mille for the sweep's own leakage).
-    let f = &report.fitted;
+    let f = &report.value.fitted;
     assert!((f.resonance.value - 870.0).abs() < 5.0 * f.resonance.error + 0.9, "{f:?}");
 }
 
@@ -229,16 +229,17 @@ fn a_swept_sine_gives_resonance_damping_lag_and_dead_time() {
 #[ignore = "long: a second excitation of the same leg"]
 fn a_multisine_gives_them_too_and_another_leg_is_distinguished_from_this_one() {
     let other = Leg { resonance: 410.0, damping: 0.04, lag: 0.1e-3, dead: 0.5e-3, gain: 0.6 };
-    let report = respond_text(&record(&other, multisine(1500.0), 60_000, 0.001), "multi.csv", Some(4000)).unwrap();
-    agrees(&report, &other, 2.0);
+    let report =
+        respond(Input::Text(&record(&other, multisine(1500.0), 60_000, 0.001)), "multi.csv", Some(4000)).unwrap();
+    agrees(&report.value, &other, 2.0);
 }
 
 #[test]
 fn a_record_that_does_not_show_the_resonance_is_refused_and_the_band_named() {
-    let short = respond_text(&record(&LEG, sweep(250.0, 6.0), 60_000, 0.002), "low.csv", None).unwrap_err();
+    let short = respond(Input::Text(&record(&LEG, sweep(250.0, 6.0), 60_000, 0.002)), "low.csv", None).unwrap_err();
     let found = expect(&short, "E0631", "does not show the resonance");
     assert!(found.message.contains("coherent are"), "{found:?}");
-    let noisy = respond_text(&record(&LEG, sweep(3000.0, 6.0), 60_000, 30.0), "noisy.csv", None).unwrap_err();
+    let noisy = respond(Input::Text(&record(&LEG, sweep(3000.0, 6.0), 60_000, 30.0)), "noisy.csv", None).unwrap_err();
     expect(&noisy, "E0631", "Hz (coherence 0.");
 }
 
@@ -250,7 +251,7 @@ fn responses_of_bad_records_are_refused_with_the_time() {
     let with = |change: &dyn Fn(&mut Vec<[f64; 3]>)| {
         let mut rows = rows.clone();
         change(&mut rows);
-        respond_text(&csv("time_s,drive_V,displacement_um", &rows), "r.csv", None)
+        respond(Input::Text(&csv("time_s,drive_V,displacement_um", &rows)), "r.csv", None)
     };
     assert!(with(&|_| {}).is_ok());
     let clipped = with(&|rows| rows.iter_mut().for_each(|r| r[2] = r[2].clamp(-0.2, 0.2))).unwrap_err();
@@ -298,28 +299,29 @@ const TRUE: [f64; 4] = [-2.0, 5.0, 0.02, -0.0015];
 
 #[test]
 fn a_cubic_gauge_is_found_to_be_cubic_and_its_coefficients_are_right() {
-    let report = gauge::calibrate_text(&csv(GAUGE, &gauge_rows(2e-4, 0.0, &TRUE)), "g.csv", None).unwrap();
-    assert_eq!(report.degree, 3, "{:?}", report.held_out_rms);
-    assert_eq!((report.coefficients.len(), report.errors.len()), (TRUE.len(), TRUE.len()));
-    for ((found, error), wanted) in report.coefficients.iter().zip(&report.errors).zip(TRUE) {
+    let report = gauge::calibrate(Input::Text(&csv(GAUGE, &gauge_rows(2e-4, 0.0, &TRUE))), "g.csv", None).unwrap();
+    assert_eq!(report.value.degree, 3, "{:?}", report.value.held_out_rms);
+    assert_eq!((report.value.coefficients.len(), report.value.errors.len()), (TRUE.len(), TRUE.len()));
+    for ((found, error), wanted) in report.value.coefficients.iter().zip(&report.value.errors).zip(TRUE) {
         assert!((found * 1e6 - wanted).abs() < 5.0 * error * 1e6 + 1e-9, "{found} ± {error} for {wanted}");
     }
-    assert!((report.residual_rms * 1e9 - 1.0).abs() < 0.2, "{}", report.residual_rms);
+    assert!((report.value.residual_rms * 1e9 - 1.0).abs() < 0.2, "{}", report.value.residual_rms);
     assert!(report.warnings.is_empty(), "{:?}", report.warnings);
-    let straight = gauge::calibrate_text(&csv(GAUGE, &gauge_rows(2e-4, 0.0, &TRUE[..2])), "g.csv", None).unwrap();
-    assert_eq!(straight.degree, 1, "{:?}", straight.held_out_rms);
+    let straight =
+        gauge::calibrate(Input::Text(&csv(GAUGE, &gauge_rows(2e-4, 0.0, &TRUE[..2]))), "g.csv", None).unwrap();
+    assert_eq!(straight.value.degree, 1, "{:?}", straight.value.held_out_rms);
 }
 
 /// The printed line, put into the reference spec, is accepted as it is.
 #[test]
 fn the_spec_takes_the_calibration_line() {
-    let report = gauge::calibrate_text(&csv(GAUGE, &gauge_rows(2e-4, 0.0, &TRUE)), "g.csv", None).unwrap();
-    let line = gauge::spec_line(&report);
+    let report = gauge::calibrate(Input::Text(&csv(GAUGE, &gauge_rows(2e-4, 0.0, &TRUE))), "g.csv", None).unwrap();
+    let line = gauge::spec_line(&report.value);
     let table: toml::Table = line.parse().unwrap();
     let terms: Vec<&str> = table["calibration"].as_array().unwrap().iter().map(|t| t.as_str().unwrap()).collect();
     assert_eq!(terms.len(), 4);
     assert!(terms[0].ends_with(" um") && terms[1].ends_with(" um/V") && terms[3].ends_with(" um/V^3"), "{line}");
-    for (term, wanted) in terms.iter().zip(&report.coefficients) {
+    for (term, wanted) in terms.iter().zip(&report.value.coefficients) {
         let number: f64 = term.split(' ').next().unwrap().parse().unwrap();
         assert!((number * 1e-6 / wanted - 1.0).abs() < 1e-7, "{term}");
     }
@@ -328,8 +330,9 @@ fn the_spec_takes_the_calibration_line() {
 #[test]
 fn hysteresis_of_a_gauge_is_measured_and_warned_of() {
     // 3 mV at 5 µm/V are 15 nm.
-    let report = gauge::calibrate_text(&csv(GAUGE, &gauge_rows(1e-4, 3e-3, &TRUE[..2])), "g.csv", Some(1)).unwrap();
-    let width = report.hysteresis.unwrap() * 1e9;
+    let report =
+        gauge::calibrate(Input::Text(&csv(GAUGE, &gauge_rows(1e-4, 3e-3, &TRUE[..2]))), "g.csv", Some(1)).unwrap();
+    let width = report.value.hysteresis.unwrap() * 1e9;
     assert!((width - 15.0).abs() < 1.5, "{width}");
     expect(&report.warnings, "W0637", "differently on the way back");
 }
@@ -340,7 +343,7 @@ fn gauges_that_cannot_be_calibrated_are_refused_with_the_time() {
     let with = |change: &dyn Fn(&mut Vec<[f64; 3]>)| {
         let mut rows = good.clone();
         change(&mut rows);
-        gauge::calibrate_text(&csv(GAUGE, &rows), "g.csv", None)
+        gauge::calibrate(Input::Text(&csv(GAUGE, &rows)), "g.csv", None)
     };
     let clipped = with(&|rows| rows.iter_mut().for_each(|r| r[1] = r[1].min(8.0))).unwrap_err();
     expect(&clipped, "E0513", "from 30.5 s to 49.6 s `gauge_V` is limited at 8");
@@ -380,18 +383,41 @@ const FORCE: &str = "time_s,force_N,displacement_um,drive_V";
 
 #[test]
 fn stiffness_is_found_through_creep_and_drift() {
-    let report = stiffness::measure_text(&csv(FORCE, &stiffness_rows(10.0, 0.08)), "k.csv").unwrap();
-    println!("{:?}", (report.stiffness, report.error, report.uncorrected, report.creep_time, report.creep_percent));
-    assert!((report.stiffness - 1e7).abs() < 5.0 * report.error + 2e4, "{} ± {}", report.stiffness, report.error);
-    assert!(report.error < 3e4, "{}", report.error);
+    let report = stiffness::measure(Input::Text(&csv(FORCE, &stiffness_rows(10.0, 0.08))), "k.csv").unwrap();
+    println!(
+        "{:?}",
+        (
+            report.value.stiffness,
+            report.value.error,
+            report.value.uncorrected,
+            report.value.creep_time,
+            report.value.creep_percent
+        )
+    );
+    assert!(
+        (report.value.stiffness - 1e7).abs() < 5.0 * report.value.error + 2e4,
+        "{} ± {}",
+        report.value.stiffness,
+        report.value.error
+    );
+    assert!(report.value.error < 3e4, "{}", report.value.error);
     // Without the corrections the creep counts as compliance.
-    assert!((report.uncorrected - 1e7).abs() > 3.0 * (report.stiffness - 1e7).abs(), "{}", report.uncorrected);
-    let tau = report.creep_time.unwrap();
+    assert!(
+        (report.value.uncorrected - 1e7).abs() > 3.0 * (report.value.stiffness - 1e7).abs(),
+        "{}",
+        report.value.uncorrected
+    );
+    let tau = report.value.creep_time.unwrap();
     assert!((2.0..4.5).contains(&tau), "{tau}");
-    assert!((report.drift * 1e9 - 0.5).abs() < 0.2, "{}", report.drift);
-    let plain = stiffness::measure_text(&csv(FORCE, &stiffness_rows(10.0, 0.0)), "k.csv").unwrap();
-    assert!(plain.creep_time.is_none(), "{:?}", plain.creep_time);
-    assert!((plain.stiffness - 1e7).abs() < 5.0 * plain.error, "{} ± {}", plain.stiffness, plain.error);
+    assert!((report.value.drift * 1e9 - 0.5).abs() < 0.2, "{}", report.value.drift);
+    let plain = stiffness::measure(Input::Text(&csv(FORCE, &stiffness_rows(10.0, 0.0))), "k.csv").unwrap();
+    assert!(plain.value.creep_time.is_none(), "{:?}", plain.value.creep_time);
+    assert!(
+        (plain.value.stiffness - 1e7).abs() < 5.0 * plain.value.error,
+        "{} ± {}",
+        plain.value.stiffness,
+        plain.value.error
+    );
 }
 
 #[test]
@@ -400,7 +426,7 @@ fn forces_that_give_no_stiffness_are_refused_with_the_time() {
     let with = |change: &dyn Fn(&mut [f64; 4])| {
         let mut rows = good.clone();
         rows.iter_mut().for_each(change);
-        stiffness::measure_text(&csv(FORCE, &rows), "k.csv").unwrap_err()
+        stiffness::measure(Input::Text(&csv(FORCE, &rows)), "k.csv").unwrap_err()
     };
     expect(&with(&|r| r[1] = -r[1]), "E0644", "displacement falls when the force rises");
     expect(

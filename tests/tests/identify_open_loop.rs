@@ -6,7 +6,7 @@
 use crate::identify_support::measured;
 use core::f64::consts::TAU;
 use specgen::identify::rate::{RateIdentification, RateModel, RateOption, identify_rate, spec_lines};
-use specgen::identify::{Options, Record, parse_drive, predict, write_table_csv};
+use specgen::identify::{Input, Options, Record, predict, read_drive, write_table_csv};
 use specgen::ir;
 use specgen_runtime::creep::{Creep, CreepEverett, CreepMemory};
 use specgen_runtime::everett::Everett;
@@ -97,7 +97,7 @@ fn residual(plant: &RateModel, hysteresis: &ir::Hysteresis, frequency: f64) -> f
     for k in 0..ticks * FINE {
         writeln!(text, "{:?},{:?}", k as f64 * step, RANGE[0] + voltages[k / FINE]).unwrap();
     }
-    let run = predict(plant, &parse_drive(&text, "plant").unwrap()).unwrap();
+    let run = predict(plant, &read_drive(Input::Text(&text), "plant").unwrap()).unwrap();
     let from = 0.1 + cycles / frequency;
     let late = run.time.iter().zip(&run.displacement).filter(|(t, _)| **t >= from);
     let errors: Vec<[f64; 2]> = late.map(|(t, y)| [t - from, y - demand(frequency, *t)]).collect();

@@ -4,7 +4,7 @@ use crate::identify_support::{Drive, generator, normal, random_table, response, 
 use specgen::everett::EverettTable;
 use specgen::identify::rate::RateModel;
 use specgen::identify::{
-    Branches, DeadTime, Identification, Options, Record, Staircase, identify, parse_drive, parse_record, predict,
+    Branches, DeadTime, Identification, Input, Options, Record, Staircase, identify, parse_record, predict, read_drive,
     read_table_csv, validate, write_table_csv,
 };
 
@@ -390,15 +390,16 @@ fn a_drive_is_predicted_with_and_without_displacement() {
         text
     };
     let model = RateModel::of_table(truth, 0.0);
-    let alone = predict(&model, &parse_drive(&text(&drive, None), "d.csv").unwrap()).unwrap();
+    let alone = predict(&model, &read_drive(Input::Text(&text(&drive, None)), "d.csv").unwrap()).unwrap();
     assert!(alone.compared.is_none() && alone.measured.is_none());
     assert_eq!(alone.samples_clipped, drive.iter().filter(|u| **u > 100.0).count());
     let worst = alone.displacement.iter().zip(&y).fold(0.0, |worst, (a, b)| worse(worst, (a - b).abs()));
     assert!(alone.displacement.len() == y.len() && worst < 1e-6 * NM, "{worst}");
-    let compared = predict(&model, &parse_drive(&text(&drive, Some(&y)), "d.csv").unwrap()).unwrap().compared.unwrap();
+    let compared =
+        predict(&model, &read_drive(Input::Text(&text(&drive, Some(&y))), "d.csv").unwrap()).unwrap().compared.unwrap();
     assert_eq!((compared.samples, compared.samples_after_jumps), (y.len() - 1, 1));
     assert!(compared.max < 1e-3 * NM, "{}", compared.max);
-    let far = parse_drive(&text(&beyond(106.0), None), "d.csv").unwrap();
+    let far = read_drive(Input::Text(&text(&beyond(106.0), None)), "d.csv").unwrap();
     assert_eq!(predict(&model, &far).unwrap_err()[0].code, "E0605");
 }
 

@@ -88,7 +88,8 @@ pub fn first_usable(record: &Record, tolerance: f64) -> Option<usize> {
             break;
         }
         // The last sample at the exact minimum of this stay.
-        let leaves = leave(&drive[at..end]) + at;
+        let (least, _) = extent(&drive[at..end]);
+        let leaves = at + drive[at..end].iter().rposition(|&u| u == least).unwrap_or(0);
         let (bottom, top) = extent(&record.displacement[at + (leaves - at) / 2..=leaves]);
         if leaves - at < JUDGED_HOLD || top - bottom <= settled {
             return Some(leaves);
@@ -97,11 +98,6 @@ pub fn first_usable(record: &Record, tolerance: f64) -> Option<usize> {
         at = end;
     }
     fallback
-}
-
-fn leave(stay: &[f64]) -> usize {
-    let (low, _) = extent(stay);
-    stay.iter().rposition(|&u| u == low).unwrap_or(0)
 }
 
 #[cfg(test)]

@@ -12,7 +12,7 @@ mod mains;
 mod resonance;
 
 use super::least_squares::{fit, mean_square};
-use super::trend::Line;
+use super::statistics::{Line, centred, rates};
 
 /// A source of error.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
@@ -88,13 +88,10 @@ pub(crate) fn explain(time: &[f64], drive: &[f64], residual: &[f64], noise: f64,
     let step = time.len().div_ceil(SAMPLES).max(1);
     let chosen: Vec<usize> = (0..time.len()).filter(|&k| keep[k]).step_by(step).collect();
     let pick = |values: &[f64]| -> Vec<f64> { chosen.iter().map(|&k| values[k]).collect() };
-    let (t, mut left) = (pick(time), pick(residual));
-    let line = Line::fit(&t, &left);
-    let offset = left.iter().fold(0.0, |sum, r| sum + r) / left.len().max(1) as f64;
-    let before = left.iter().fold(0.0, |sum, r| sum + (r - offset) * (r - offset)) / left.len().max(1) as f64;
-    left.iter_mut().zip(&t).for_each(|(r, t)| *r -= line.at(*t));
+    let (t, whole) = (pick(time), pick(residual));
+    let mut left = Line::fit(&t, &whole).removed(&t, &whole);
     let total = mean_square(&left);
-    let removed = before - total;
+    let removed = mean_square(&centred(whole)) - total;
 
     let rate = centred(pick(&rates(time, drive, keep)));
     let mut rate_delay = 0.0;
@@ -196,18 +193,6 @@ fn creep_of(
     RemovedPart { explained, left: if best.is_empty() { left.to_vec() } else { best } }
 }
 
-/// Central differences, V/s, without the excluded samples: a jump after a sample is not its rate.
-fn rates(time: &[f64], drive: &[f64], keep: &[bool]) -> Vec<f64> {
-    let last = time.len() - 1;
-    (0..=last)
-        .map(|k| {
-            let (a, b) = (k.saturating_sub(1), if k < last { k + 1 } else { last });
-            let (a, b) = (if keep[a] { a } else { k }, if keep[b] { b } else { k });
-            if b > a { (drive[b] - drive[a]) / (time[b] - time[a]) } else { 0.0 }
-        })
-        .collect()
-}
-
 /// First-order lag of `drive` with time constant `tau` (s), started at its first value.
 pub(crate) fn lagging(time: &[f64], drive: &[f64], tau: f64) -> Vec<f64> {
     let mut state = drive.first().copied().unwrap_or(0.0);
@@ -220,12 +205,6 @@ pub(crate) fn lagging(time: &[f64], drive: &[f64], tau: f64) -> Vec<f64> {
             state
         })
         .collect()
-}
-
-fn centred(mut values: Vec<f64>) -> Vec<f64> {
-    let mean = values.iter().fold(0.0, |sum, v| sum + v) / values.len().max(1) as f64;
-    values.iter_mut().for_each(|v| *v -= mean);
-    values
 }
 
 #[cfg(test)]

@@ -3,22 +3,21 @@
 //! [`Format`] has the codes and texts for the mistakes of a kind of file. Lines are read one by one, so that only the
 //! numbers are kept in memory.
 
-mod dialect;
 pub(crate) mod foreign;
 mod head;
-mod input;
-mod line_numbers;
+mod lines;
 pub(crate) mod names;
 
 use std::io::Read;
 
 use super::findings::Findings;
-use dialect::{decoded, is_blank, is_comment, is_mark, split};
-use input::Input;
+use head::{decoded, has_fields, is_mark, split};
+use lines::LineReader;
 use specgen_language::diagnostic::{Code, codes};
 use specgen_language::interrupt;
 
-pub(crate) use line_numbers::LineNumbers;
+pub(crate) use head::Head;
+pub(crate) use lines::LineNumbers;
 
 /// Codes and texts for the mistakes in a kind of file.
 #[derive(Debug)]
@@ -50,17 +49,6 @@ pub(crate) const RECORD: Format = Format {
 /// Most samples; a few columns of this length take a gigabyte.
 const MAX_SAMPLES: usize = 1 << 25;
 
-/// The header of a file.
-#[derive(Debug)]
-pub(crate) struct Header {
-    /// Names of the columns, without surrounding white space; none if the file begins with numbers.
-    pub(crate) names: Vec<String>,
-    /// Its line, counted from 1.
-    pub(crate) line: usize,
-    /// Time between the samples that a preamble states, s.
-    pub(crate) interval: Option<f64>,
-}
-
 /// A column that is read.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Column<'a> {
@@ -81,7 +69,7 @@ pub(crate) struct Lines<'a> {
     decimal: Option<char>,
     /// Whether an earlier line marked the file as simulated.
     simulated: bool,
-    input: Input<'a>,
+    input: LineReader<'a>,
 }
 
 /// The samples of a file.
@@ -111,21 +99,20 @@ pub fn marked_as_simulated(text: &str) -> String {
     format!("{names}\n{SIMULATED}\n{rest}")
 }
 
-/// Reads the header; `None` after the problem was reported.
+/// Reads the head; `None` after the problem was reported.
 pub(crate) fn open<'a>(
     source: impl Read + 'a,
     format: &'a Format,
     findings: &mut Findings,
-) -> Option<(Header, Lines<'a>)> {
-    let mut input = Input::new(source);
-    let mut lines = match input.head(head::LINES) {
+) -> Option<(Head, Lines<'a>)> {
+    let mut input = LineReader::new(source);
+    let mut ahead = match input.head(head::LINES) {
         Ok(lines) => lines,
         Err(e) => {
-            findings.add(format.header, None, format!("cannot be read: {e}"), "write plain CSV");
-            return None;
+            return findings.refuse(format.header, None, format!("cannot be read: {e}"), "write plain CSV");
         }
     };
-    if let Some((number, line)) = lines.first() {
+    if let Some((number, line)) = ahead.first() {
         if foreign::report(line, findings) {
             return None;
         }
@@ -134,23 +121,18 @@ pub(crate) fn open<'a>(
             return None;
         }
     }
-    let found = if format.preamble { head::of_record(&lines) } else { head::plain(&lines) };
-    let Some(found) = found else {
-        if format.preamble {
-            findings.add(format.header, None, "is empty".to_owned(), EMPTY);
-            return None;
-        }
-        let header = Header { names: Vec::new(), line: 1, interval: None };
-        let nothing = Lines { format, names: 0, separator: b',', decimal: None, simulated: false, input };
-        return Some((header, nothing));
-    };
-    let simulated = lines.drain(..found.next).any(|(_, line)| is_mark(&line));
-    if format.preamble && check_decimal_commas(&found, &lines, format, findings) {
-        return None;
+    let found = head::find(&ahead, format.preamble);
+    if found.is_none() && format.preamble {
+        return findings.refuse(format.header, None, "is empty".to_owned(), EMPTY);
     }
-    input.put_back(lines);
-    let lines = Lines { format, names: found.names.len(), separator: found.separator, decimal: None, simulated, input };
-    Some((Header { names: found.names, line: found.line, interval: found.interval }, lines))
+    let head = found.unwrap_or(Head { names: Vec::new(), line: 1, interval: None, next: ahead.len(), separator: b',' });
+    let simulated = ahead.drain(..head.next).any(|(_, line)| is_mark(&line));
+    if let Some((line, message, help)) = head.ambiguous_commas(&ahead).filter(|_| format.preamble) {
+        return findings.refuse(format.value, Some(line), message, &help);
+    }
+    input.put_back(ahead);
+    let lines = Lines { format, names: head.names.len(), separator: head.separator, decimal: None, simulated, input };
+    Some((head, lines))
 }
 
 const EMPTY: &str = "the first line must be the header `time_s,drive_V,displacement_um`";
@@ -159,40 +141,6 @@ const EMPTY: &str = "the first line must be the header `time_s,drive_V,displacem
 fn not_text(line: Option<usize>, at: usize, byte: u8, findings: &mut Findings) {
     let message = format!("is not a text file in UTF-8: byte {at} of the line is 0x{byte:02x}");
     findings.add(codes::RECORD_NOT_TEXT, line, message, "export the record as CSV text in UTF-8");
-}
-
-/// Rows that are checked for decimal commas.
-const ROWS: usize = 10;
-
-/// Reports commas that are both decimal signs and separators; returns whether there are any.
-fn check_decimal_commas(
-    head: &head::Head,
-    lines: &[(usize, Vec<u8>)],
-    format: &Format,
-    findings: &mut Findings,
-) -> bool {
-    let rows = || lines.iter().filter(|(_, line)| !is_blank(line) && !is_comment(line)).take(ROWS);
-    let is_longer = |line: &[u8]| split(line, b',').len() > head.names.len() + 1;
-    let Some((number, line)) = rows().next() else { return false };
-    let no_points = rows().all(|(_, line)| dialect::is_row(line, b',') && !line.contains(&b'.'));
-    if head.separator != b',' || head.names.len() < 2 || !no_points || !rows().all(|(_, line)| is_longer(line)) {
-        return false;
-    }
-    let fields: Vec<String> = split(line, b',').into_iter().map(decoded).collect();
-    let mended: Vec<String> = fields.chunks(2).map(|pair| pair.join(",")).collect();
-    let example = if fields.len() == 2 * head.names.len() {
-        format!("; this line is then `{}`", mended.join(";"))
-    } else {
-        String::new()
-    };
-    let message = format!(
-        "has {} numbers for {} columns: a comma seems to be the decimal sign, and the separator, too",
-        fields.len(),
-        head.names.len()
-    );
-    let help = format!("export with semicolons or tabs between the columns, or with decimal points{example}");
-    findings.add(format.value, Some(*number), message, &help);
-    true
 }
 
 impl Lines<'_> {
@@ -211,7 +159,7 @@ impl Lines<'_> {
                     break;
                 }
             };
-            if is_blank(&text) || is_comment(&text) {
+            if !has_fields(&text) {
                 self.simulated |= is_mark(&text);
                 continue;
             }
@@ -245,7 +193,7 @@ impl Lines<'_> {
     }
 
     fn finite(&self, field: &[u8]) -> Option<f64> {
-        let (value, _) = dialect::number(std::str::from_utf8(field).ok()?, self.separator)?;
+        let (value, _) = head::number(std::str::from_utf8(field).ok()?, self.separator)?;
         Some(value).filter(|value| value.is_finite())
     }
 
@@ -263,7 +211,7 @@ impl Lines<'_> {
             return f64::NAN;
         }
         let text = decoded(field);
-        match dialect::number(&text, self.separator) {
+        match head::number(&text, self.separator) {
             Some((value, _)) if !value.is_finite() => format.report_not_finite(line, name, &text, findings),
             Some((value, sign)) => {
                 if sign.is_none() || *self.decimal.get_or_insert(sign.unwrap_or('.')) == sign.unwrap_or('.') {

@@ -96,7 +96,6 @@ fn of_hdf5(path: &Path) -> Result<Columns, String> {
 }
 
 /// Columns of equal length, line by line, names first.
-#[derive(Debug)]
 pub(crate) struct Lines {
     columns: Columns,
     next: usize,

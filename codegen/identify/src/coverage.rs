@@ -52,24 +52,16 @@ pub(crate) fn check_range(record: &Record, plane: &Plane, findings: &mut Finding
     let um = record.displacement_range() * 1e6;
     if !(1.0 / UNIT_RATIO..=UNIT_RATIO).contains(&ratio) {
         let unit = if ratio > 1.0 { "mV" } else { "kV" };
-        findings.add(
-            codes::DRIVE_UNIT,
-            None,
-            format!("{found}: is the column in {unit}?"),
-            "write the drive in volts at the stack",
-        );
+        let message = format!("{found}: is the column in {unit}?");
+        findings.add(codes::DRIVE_UNIT, None, message, "write the drive in volts at the stack");
         return;
     }
     let as_drive = (um / span - 1.0).abs() < 0.02;
     if (ratio - 1.0).abs() > 0.2 && (as_drive || sanity::look_swapped(&record.drive, &record.displacement)) {
         let why = if as_drive { "the span of the drive" } else { "without noise, as a command does" };
         let message = format!("{found}, and the displacement covers {um:.3}, {why}");
-        findings.add(
-            codes::COLUMNS_SWAPPED,
-            None,
-            message,
-            "the columns `drive_V` and `displacement_um` seem to be swapped",
-        );
+        let help = "the columns `drive_V` and `displacement_um` seem to be swapped";
+        findings.add(codes::COLUMNS_SWAPPED, None, message, help);
         return;
     }
     if bottom < low - BEYOND * span || top > high + BEYOND * span {
@@ -80,12 +72,9 @@ pub(crate) fn check_range(record: &Record, plane: &Plane, findings: &mut Finding
     let interval = plane.interval();
     if bottom > low + interval {
         let message = format!("{found}: no cell with a down_threshold below {bottom} V was ever excited");
-        findings.add(
-            codes::NOT_EXCITED,
-            None,
-            message,
-            &format!("let the drive fall to the lower end of its range between the curves; {}", such_a_drive(plane)),
-        );
+        let help =
+            format!("let the drive fall to the lower end of its range between the curves; {}", such_a_drive(plane));
+        findings.add(codes::NOT_EXCITED, None, message, &help);
     }
     if top < high - interval {
         let message = format!("{found}: no cell with an up_threshold above {top} V was ever excited");
@@ -234,12 +223,8 @@ pub(crate) fn check_excited(plane: &Plane, excited: &[bool], findings: &mut Find
         100.0 * missing as f64 / excited.len() as f64,
         places.join("; "),
     );
-    findings.add(
-        codes::CELLS_INTERPOLATED,
-        None,
-        message,
-        "add reversal curves that turn back in that part of the range",
-    );
+    let help = "add reversal curves that turn back in that part of the range";
+    findings.add(codes::CELLS_INTERPOLATED, None, message, help);
     regions
 }
 

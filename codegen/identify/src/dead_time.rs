@@ -45,7 +45,7 @@ pub fn estimate(plane: &Plane, record: &Record, first: usize, branches: &[Branch
     let longest = longest(record, branches);
     let end = within(record, longest);
     let found = search(longest, |tried| {
-        let mut shifts = shifts(tried);
+        let mut shifts: Vec<Shift> = tried.iter().map(|&tau| Shift { tau, next: 0 }).collect();
         let fill = |k: usize, values: &mut [f64]| {
             for (value, shift) in values.iter_mut().zip(&mut shifts) {
                 *value = scale * shift.displacement(record, k);
@@ -113,10 +113,6 @@ pub(super) fn search(longest: f64, mut residual: impl FnMut(&[f64]) -> Option<Ve
 pub(super) fn within(record: &Record, tau: f64) -> usize {
     let last = record.time[record.time.len() - 1];
     record.time.partition_point(|t| t + tau <= last)
-}
-
-fn shifts(tried: &[f64]) -> Vec<Shift> {
-    tried.iter().map(|&tau| Shift { tau, next: 0 }).collect()
 }
 
 /// Residual of the best fit of each target, Σ of squares; `None` if the Gram matrix is not positive definite.

@@ -68,25 +68,23 @@ fn glitches(
             time[k],
             off * 1e6
         );
-        findings.add(
-            codes::RECORD_GLITCH,
-            Some(lines.at(k)),
-            message,
-            "look for interference or a loose contact, or record again",
-        );
+        let help = "look for interference or a loose contact, or record again";
+        findings.add(codes::RECORD_GLITCH, Some(lines.at(k)), message, help);
     }
 }
 
 fn jumps(lines: &LineNumbers, time: &[f64], drive: &[f64], weightless: &mut [bool], findings: &mut Findings) {
     let (low, high) = extent(drive);
-    let mut k = 1;
-    while k < drive.len() {
-        if (drive[k] - drive[k - 1]).abs() <= JUMP * (high - low) {
-            k += 1;
+    // Further jumps in the settling time belong to the one that was reported.
+    let mut reported = 0;
+    let is_jump = |k: &usize| (drive[*k] - drive[k - 1]).abs() > JUMP * (high - low);
+    for k in (1..drive.len()).filter(is_jump) {
+        let end = (k + SETTLING).min(drive.len());
+        weightless[k..end].fill(true);
+        if k < reported {
             continue;
         }
-        let end = (k + SETTLING).min(drive.len());
-        weightless[k..end].iter_mut().for_each(|w| *w = true);
+        reported = end;
         let message = format!(
             "at {} s the drive jumps from {} V to {} V: {} samples from there get no weight",
             time[k],
@@ -94,20 +92,7 @@ fn jumps(lines: &LineNumbers, time: &[f64], drive: &[f64], weightless: &mut [boo
             drive[k],
             end - k
         );
-        findings.add(
-            codes::RECORD_JUMP,
-            Some(lines.at(k)),
-            message,
-            "drive by ramps or sines: a jump excites the resonance, which hides the hysteresis",
-        );
-        k += 1;
-        // Further jumps in the settling time belong to it.
-        while k < end {
-            if (drive[k] - drive[k - 1]).abs() > JUMP * (high - low) {
-                let end = (k + SETTLING).min(drive.len());
-                weightless[k..end].iter_mut().for_each(|w| *w = true);
-            }
-            k += 1;
-        }
+        let help = "drive by ramps or sines: a jump excites the resonance, which hides the hysteresis";
+        findings.add(codes::RECORD_JUMP, Some(lines.at(k)), message, help);
     }
 }

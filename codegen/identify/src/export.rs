@@ -61,8 +61,7 @@ pub(crate) fn read_nodes(
 ) -> Option<(EverettTable, LineNumbers)> {
     let [message, help] = line;
     if text.lines().next().is_none_or(|first| first.trim() != header) {
-        findings.add(code, Some(1), format!("the header must be `{header}`"), help);
-        return None;
+        return findings.refuse(code, Some(1), format!("the header must be `{header}`"), help);
     }
     let format = Format {
         header: code,
@@ -89,8 +88,7 @@ pub(crate) fn read_nodes(
         }
         _ => {
             let message = format!("{} nodes do not make a triangle of rising thresholds", nodes.len());
-            findings.add(code, None, message, help);
-            return None;
+            return findings.refuse(code, None, message, help);
         }
     };
     let tolerance = 1e-9 * (table.drive_max - table.drive_min);
@@ -121,12 +119,8 @@ fn check_weights(table: &EverettTable, lines: &LineNumbers, findings: &mut Findi
                     table.threshold(down),
                     weight * 1e6
                 );
-                findings.add(
-                    codes::TABLE_FILE,
-                    Some(lines.at(EverettTable::index(up, down))),
-                    message,
-                    "identify the record again",
-                );
+                let help = "identify the record again";
+                findings.add(codes::TABLE_FILE, Some(lines.at(EverettTable::index(up, down))), message, help);
             }
         }
     }

@@ -1,11 +1,10 @@
 //! Opens data files: to keep their text, or to read them line by line.
 
-use std::fs::File;
 use std::io::{Read, Seek};
 use std::path::Path;
 
 use super::columns::foreign;
-use super::container::{Kind, Lines};
+use super::container::Kind;
 use super::findings::Findings;
 use specgen_language::diagnostic::{Diagnostic, codes};
 pub use specgen_language::files::MAX_BYTES as MAX_FILE_BYTES;
@@ -28,8 +27,7 @@ fn read_text(path: &Path, findings: &mut Findings) -> Option<String> {
         Err(ReadError::Large(limit)) => {
             let message = format!("is larger than {} MiB", limit >> 20);
             let help = "name the table that `specgen identify RECORD -o table.csv` makes of a record of any size";
-            findings.add(codes::RECORD_TOO_LARGE, None, message, help);
-            return None;
+            return findings.refuse(codes::RECORD_TOO_LARGE, None, message, help);
         }
         Err(unread) => {
             unreadable(&unread, findings);
@@ -45,47 +43,28 @@ fn read_text(path: &Path, findings: &mut Findings) -> Option<String> {
     if let Some(at) = end_of_text.or(bad) {
         let line = 1 + bytes[..at].iter().filter(|&&b| b == b'\n').count();
         let message = format!("is not a text file in UTF-8: byte {at} is 0x{:02x}", bytes[at]);
-        findings.add(codes::RECORD_NOT_TEXT, Some(line), message, "export the record as CSV text in UTF-8");
-        return None;
+        return findings.refuse(codes::RECORD_NOT_TEXT, Some(line), message, "export the record as CSV text in UTF-8");
     }
     Some(String::from_utf8_lossy(bytes).into_owned())
 }
 
 /// A data file to read lines from, or `None` after the reason was reported. A file of MATLAB, HDF5 or TDMS has the size
 /// limit of a text in memory; any other is read in sequence.
-pub(crate) fn open_file(path: &Path, findings: &mut Findings) -> Option<Source> {
+pub(crate) fn open_file(path: &Path, findings: &mut Findings) -> Option<Box<dyn Read>> {
     findings.lies_at(path);
     let (mut file, mut first) =
         (files::open_file(path).map_err(|unread| unreadable(&unread, findings)).ok()?, Vec::new());
     let begun = (&mut file).take(Kind::TELLING as u64).read_to_end(&mut first).and_then(|_| file.rewind());
     let bytes = begun.and_then(|()| file.metadata()).map_err(|error| unreadable(&error.into(), findings)).ok()?.len();
-    let Some(kind) = Kind::of(&first) else { return Some(Source::File(file)) };
+    let Some(kind) = Kind::of(&first) else { return Some(Box::new(file)) };
     if bytes > MAX_FILE_BYTES {
         foreign::report_as(&first, &format!("and larger than {} MiB", MAX_FILE_BYTES >> 20), findings);
         return None;
     }
     kind.open(file, path)
-        .map(Source::Container)
+        .map(|lines| Box::new(lines) as Box<dyn Read>)
         .map_err(|why| foreign::report_as(&first, &format!("and {why}"), findings))
         .ok()
-}
-
-/// Source of the lines of a data file.
-#[derive(Debug)]
-pub(crate) enum Source {
-    /// Its text.
-    File(File),
-    /// Columns of a binary file.
-    Container(Lines),
-}
-
-impl Read for Source {
-    fn read(&mut self, into: &mut [u8]) -> std::io::Result<usize> {
-        match self {
-            Self::File(file) => file.read(into),
-            Self::Container(lines) => lines.read(into),
-        }
-    }
 }
 
 fn unreadable(unread: &ReadError, findings: &mut Findings) {

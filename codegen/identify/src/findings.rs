@@ -24,6 +24,11 @@ impl Findings {
         Self { path: path.to_owned(), place: path.to_owned(), found: Vec::new(), count: BTreeMap::new() }
     }
 
+    /// The same, after the warnings of an earlier step.
+    pub(crate) fn after(path: &str, warnings: &[Diagnostic]) -> Self {
+        Self { found: warnings.to_vec(), ..Self::new(path) }
+    }
+
     /// The file as the user named it.
     pub(crate) fn path(&self) -> &str {
         &self.path
@@ -46,6 +51,12 @@ impl Findings {
         if *count <= SHOWN_PER_CODE {
             self.found.push(Diagnostic::in_file(&self.path, line, code, message, help));
         }
+    }
+
+    /// Adds a finding that ends the work on the file.
+    pub(crate) fn refuse<T>(&mut self, code: Code, line: Option<usize>, message: String, help: &str) -> Option<T> {
+        self.add(code, line, message, help);
+        None
     }
 
     /// Whether a finding refuses the file.

@@ -9,7 +9,7 @@ use serde::Serialize;
 use super::least_squares::{fit, mean_square};
 use super::rate::RateModel;
 use super::rate::predict::{Drive, predict};
-use super::statistics::extent;
+use super::statistics::{extent, mean_and_error};
 use crate::everett::EverettTable;
 use specgen_language::diagnostic::Diagnostic;
 
@@ -59,15 +59,13 @@ pub fn of(
         .map(|range| if range.len() < SAMPLES { None } else { slope(range).map(|(gain, _)| gain) })
         .collect();
     let (Some(parts), Some((gain, square))) = (parts, slope(0..count)) else { return Ok(None) };
-    let mean = parts.iter().fold(0.0, |sum, g| sum + g) / PARTS as f64;
-    let spread = parts.iter().fold(0.0, |sum, g| sum + (g - mean) * (g - mean)) / (PARTS - 1) as f64;
     let one = vec![1.0; count];
     let off: Vec<f64> = measured.iter().zip(&predicted.displacement).map(|(y, x)| y - x).collect();
     let before = fit(&[&one, times], &off).map_or(0.0, |found| mean_square(&found.residual));
     let (low, high) = extent(measured);
     Ok(Some(LegGain {
         gain,
-        error: (spread / PARTS as f64).sqrt(),
+        error: mean_and_error(&parts).1,
         travel: high - low,
         residual_rms: square.sqrt(),
         residual_before: before.sqrt(),

@@ -1,22 +1,17 @@
 //! Calibration of a gauge: its voltage against a reference displacement, as the polynomial of a spec.
 
 use serde::Serialize;
-use std::path::Path;
 
+use super::estimate::{self, Estimate};
 use super::findings::Findings;
 use super::least_squares::{Fit, fit, mean_square};
-use super::reading::Reading;
-use super::signals::{self, ColumnSpec, Signals};
-use super::statistics::{extent, median};
+use super::signals::{ColumnSpec, Input, Signals, optional, required};
+use super::statistics::{extent, mean, mean_and_error, median};
 use specgen_language::diagnostic::{Diagnostic, codes};
 
 /// A calibration and its quality. Lengths in m, voltages in V.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct GaugeReport {
-    /// Name of the record.
-    pub record: String,
-    /// Whether a comment in it marks it as simulated.
-    pub simulated: bool,
+pub struct GaugeCalibration {
     /// Samples of the record.
     pub samples: usize,
     /// Degree of the polynomial, 1 to 5.
@@ -49,9 +44,6 @@ pub struct GaugeReport {
     pub points: Vec<[f64; 2]>,
     /// Knots (V, m) of the calibration as a table: means of the reference over even steps of the voltage.
     pub table: Vec<[f64; 2]>,
-    /// Findings that refuse nothing.
-    #[serde(skip)]
-    pub warnings: Vec<Diagnostic>,
 }
 
 /// Highest power that a spec takes.
@@ -71,11 +63,7 @@ const HYSTERESIS: f64 = 2.0;
 /// A reference range (m) outside these bounds suggests another unit.
 const PLAUSIBLE: [f64; 2] = [50e-9, 5e-3];
 
-const COLUMNS: [ColumnSpec; 3] = [
-    ColumnSpec { name: "time_s", required: false },
-    ColumnSpec { name: "gauge_V", required: true },
-    ColumnSpec { name: "reference_um", required: true },
-];
+const COLUMNS: [ColumnSpec; 3] = [optional("time_s"), required("gauge_V"), required("reference_um")];
 
 /// Calibrates from the columns `gauge_V`, `reference_um` and, if there is one, `time_s`. `degree` 1 to 5 overrides the choice.
 ///
@@ -83,36 +71,18 @@ const COLUMNS: [ColumnSpec; 3] = [
 /// All findings if the record cannot be read or calibrated: E0512 and E0513 for a gauge that does not move, E0635 for a
 /// calibration that is not monotone, E0636 for too few samples or a wrong unit.
 pub fn calibrate(
-    path: &Path,
+    input: Input,
     shown_as: &str,
     degree: Option<usize>,
-    reading: &Reading,
-) -> Result<GaugeReport, Vec<Diagnostic>> {
-    of_signals(&signals::read(path, shown_as, &COLUMNS, reading)?, degree)
+) -> Result<Estimate<GaugeCalibration>, Vec<Diagnostic>> {
+    estimate::of(input, shown_as, &COLUMNS, |signals, findings| calibrate_checked(signals, degree, findings))
 }
 
-/// The same from the text of a record.
-///
-/// # Errors
-/// As [`calibrate`].
-pub fn calibrate_text(text: &str, shown_as: &str, degree: Option<usize>) -> Result<GaugeReport, Vec<Diagnostic>> {
-    of_signals(&signals::parse(text, shown_as, &COLUMNS)?, degree)
-}
-
-fn of_signals(signals: &Signals, degree: Option<usize>) -> Result<GaugeReport, Vec<Diagnostic>> {
-    let mut findings = Findings::new(&signals.shown_as);
-    let report = calibrate_checked(signals, degree, &mut findings);
-    let (mut report, warnings) = findings.conclude(report)?;
-    report.warnings = warnings;
-    Ok(report)
-}
-
-fn calibrate_checked(signals: &Signals, degree: Option<usize>, findings: &mut Findings) -> Option<GaugeReport> {
+fn calibrate_checked(signals: &Signals, degree: Option<usize>, findings: &mut Findings) -> Option<GaugeCalibration> {
     let (volts, micrometres) = (signals.column(1), signals.column(2));
     if volts.len() < PER_COEFFICIENT * 2 * FOLDS {
         let message = format!("has {} samples; at least {} are needed", volts.len(), PER_COEFFICIENT * 2 * FOLDS);
-        findings.add(codes::GAUGE_RECORD, None, message, "record more positions of the reference");
-        return None;
+        return findings.refuse(codes::GAUGE_RECORD, None, message, "record more positions of the reference");
     }
     signals.check_moves(2, 1, ["reference_um", "gauge_V"], findings);
     signals.check_moves(1, 2, ["gauge_V", "reference_um"], findings);
@@ -126,26 +96,16 @@ fn calibrate_checked(signals: &Signals, degree: Option<usize>, findings: &mut Fi
     let scaled: Vec<f64> = volts.iter().map(|v| (2.0 * v - low - high) / (high - low)).collect();
     let held_out = held_out(&scaled, &reference);
     if held_out.is_empty() {
-        findings.add(
-            codes::GAUGE_RECORD,
-            None,
-            "the voltages are too few to hold some out".to_owned(),
-            "record more positions of the reference",
-        );
-        return None;
+        let message = "the voltages are too few to hold some out".to_owned();
+        return findings.refuse(codes::GAUGE_RECORD, None, message, "record more positions of the reference");
     }
     let degree = match degree {
         Some(degree) => degree.clamp(1, HIGHEST),
         None => choose(&held_out),
     };
     let Some(found) = polynomial(&scaled, &reference, degree) else {
-        findings.add(
-            codes::GAUGE_RECORD,
-            None,
-            format!("a polynomial of degree {degree} is not determined"),
-            "record more positions of the reference",
-        );
-        return None;
+        let message = format!("a polynomial of degree {degree} is not determined");
+        return findings.refuse(codes::GAUGE_RECORD, None, message, "record more positions of the reference");
     };
     let square = mean_square(&found.residual) * volts.len() as f64 / (volts.len() - degree - 1) as f64;
     let (coefficients, errors) = to_volts(&found, square, low, high);
@@ -167,29 +127,20 @@ fn calibrate_checked(signals: &Signals, degree: Option<usize>, findings: &mut Fi
             least.1,
             signals.place(near)
         );
-        findings.add(
-            codes::GAUGE_NOT_MONOTONE,
-            Some(signals.lines.at(near)),
-            message,
-            "use the gauge where its voltage rises or falls all the way, or look for a fault there",
-        );
+        let help = "use the gauge where its voltage rises or falls all the way, or look for a fault there";
+        findings.add(codes::GAUGE_NOT_MONOTONE, Some(signals.lines.at(near)), message, help);
     }
     let worst = (0..volts.len()).fold(0, |w, k| if found.residual[k].abs() > found.residual[w].abs() { k } else { w });
     let residual_rms = mean_square(&found.residual).sqrt();
     let hysteresis = hysteresis(&reference, &scaled, &found.residual);
     if let Some(width) = hysteresis.filter(|width| *width > HYSTERESIS * residual_rms.max(noise_of(&found.residual))) {
         let message = format!("the gauge reads up to {:.2} nm differently on the way back", width * 1e9);
-        findings.add(
-            codes::GAUGE_HYSTERESIS,
-            None,
-            message,
-            "no calibration removes that: look for play or friction in the mount, or a delay between the columns",
-        );
+        let help =
+            "no calibration removes that: look for play or friction in the mount, or a delay between the columns";
+        findings.add(codes::GAUGE_HYSTERESIS, None, message, help);
     }
     glitches(signals, &found.residual, findings);
-    Some(GaugeReport {
-        record: signals.shown_as.clone(),
-        simulated: signals.simulated,
+    Some(GaugeCalibration {
         samples: volts.len(),
         degree,
         held_out_rms: held_out.iter().map(|folds| root_mean(folds)).collect(),
@@ -205,7 +156,6 @@ fn calibrate_checked(signals: &Signals, degree: Option<usize>, findings: &mut Fi
         least_slope_percent: 100.0 * least.0 / mean_slope,
         points: volts.iter().zip(&found.residual).map(|(v, r)| [*v, *r]).collect(),
         table: table(volts, &reference, low, high),
-        warnings: Vec::new(),
     })
 }
 
@@ -224,12 +174,8 @@ fn check_units(signals: &Signals, volts: [f64; 2], reference: [f64; 2], findings
     let largest = if volts[1].abs() > volts[0].abs() { volts[1] } else { volts[0] };
     if largest.abs() > 100.0 {
         let message = format!("the gauge shows {largest} V (at {}): is it in mV?", at(1, largest));
-        findings.add(
-            codes::GAUGE_RECORD,
-            None,
-            message,
-            "write the gauge's voltage in volts; are the columns swapped?",
-        );
+        let help = "write the gauge's voltage in volts; are the columns swapped?";
+        findings.add(codes::GAUGE_RECORD, None, message, help);
     }
 }
 
@@ -344,7 +290,7 @@ fn held_out(x: &[f64], y: &[f64]) -> Vec<Vec<f64>> {
 }
 
 fn root_mean(squares: &[f64]) -> f64 {
-    (squares.iter().fold(0.0, |sum, s| sum + s) / squares.len() as f64).sqrt()
+    mean(squares).sqrt()
 }
 
 /// A smaller relative gain in error does not justify a degree.
@@ -357,10 +303,8 @@ fn choose(scores: &[Vec<f64>]) -> usize {
         (0..scores.len()).fold(0, |best, k| if root_mean(&scores[k]) < root_mean(&scores[best]) { k } else { best });
     for (k, folds) in scores.iter().enumerate().take(best) {
         let worse: Vec<f64> = folds.iter().zip(&scores[best]).map(|(a, b)| a.sqrt() - b.sqrt()).collect();
-        let count = worse.len() as f64;
-        let mean = worse.iter().fold(0.0, |sum, d| sum + d) / count;
-        let spread = worse.iter().fold(0.0, |sum, d| sum + (d - mean) * (d - mean)) / (count - 1.0);
-        if mean <= (spread / count).sqrt() || mean <= WORTHWHILE * root_mean(&scores[best]) {
+        let (excess, error) = mean_and_error(&worse);
+        if excess <= error || excess <= WORTHWHILE * root_mean(&scores[best]) {
             return k + 1;
         }
     }
@@ -415,12 +359,8 @@ fn glitches(signals: &Signals, residual: &[f64], findings: &mut Findings) {
             r * 1e9,
             (r / usual).abs()
         );
-        findings.add(
-            codes::GAUGE_GLITCH,
-            Some(signals.lines.at(k)),
-            message,
-            "delete the point if the reading was disturbed, or record again",
-        );
+        let help = "delete the point if the reading was disturbed, or record again";
+        findings.add(codes::GAUGE_GLITCH, Some(signals.lines.at(k)), message, help);
     }
 }
 
@@ -442,7 +382,7 @@ fn table(volts: &[f64], reference: &[f64], low: f64, high: f64) -> Vec<[f64; 2]>
 
 /// The calibration as a line of a spec.
 #[must_use]
-pub fn spec_line(report: &GaugeReport) -> String {
+pub fn spec_line(report: &GaugeCalibration) -> String {
     let terms: Vec<String> = report
         .coefficients
         .iter()

@@ -15,6 +15,7 @@ use super::findings::Findings;
 use super::normal::{Normal, Step, Sums, Weighting, walk, weight};
 use super::record::Record;
 use super::regressor::Plane;
+use super::statistics::{extent, mean, mean_and_error};
 use super::{DeadTime, Options, coverage, dead_time, prior, selection};
 use specgen_language::diagnostic::{Diagnostic, codes};
 use specgen_language::interrupt;
@@ -68,16 +69,9 @@ pub struct GridChoice {
 /// # Errors
 /// As [`super::identify`]; E0622 if the curves have too few different reversal voltages to hold any out.
 pub fn choose_grid(record: &Record, drive: [f64; 2], dead_time: DeadTime) -> Result<GridChoice, Vec<Diagnostic>> {
-    let mut findings = Findings::new(&record.shown_as);
+    let mut findings = Findings::after(&record.shown_as, &record.warnings);
     let choice = choose(record, drive, dead_time, &mut findings);
-    match choice {
-        Some(choice) if !findings.any_error() => Ok(choice),
-        _ => {
-            let mut all = record.warnings.clone();
-            all.extend(findings.into_diagnostics());
-            Err(all)
-        }
-    }
+    findings.conclude(choice).map(|(choice, _)| choice)
 }
 
 fn choose(record: &Record, drive: [f64; 2], dead_time: DeadTime, findings: &mut Findings) -> Option<GridChoice> {
@@ -115,13 +109,8 @@ fn choose(record: &Record, drive: [f64; 2], dead_time: DeadTime, findings: &mut 
             "the curves turn back at {levels} different voltages; cross-validation of the grid needs at least {}",
             FEWEST_FOLDS + 1
         );
-        findings.add(
-            codes::GRID_NOT_CHOSEN,
-            None,
-            message,
-            "give the grid with --grid, or record curves that turn back at more voltages",
-        );
-        return None;
+        let help = "give the grid with --grid, or record curves that turn back at more voltages";
+        return findings.refuse(codes::GRID_NOT_CHOSEN, None, message, help);
     }
     let chosen = used.branches.iter().zip(fold_of).filter(|(b, _)| !(falls_only && b.rising));
     let (branches, fold_of): (Vec<Branch>, Vec<Option<usize>>) = chosen.map(|(b, fold)| (*b, fold)).unzip();
@@ -129,19 +118,15 @@ fn choose(record: &Record, drive: [f64; 2], dead_time: DeadTime, findings: &mut 
     let mut errors = Vec::new();
     for grid in TRIED.into_iter().filter(|grid| *grid <= finest.grid) {
         let plane = Plane { grid, range: drive };
-        let (always, parts) = sums(&plane, record, used.first, (&branches, &fold_of, folds), weighting, &target);
-        let mut whole = always.gram;
-        let mut whole_rhs = always.rhs[0].clone();
-        for (part, _) in &parts {
-            whole += &part.gram;
-            whole_rhs.iter_mut().zip(&part.rhs[0]).for_each(|(sum, b)| *sum += b);
-        }
+        let mut parts = sums(&plane, record, used.first, (&branches, &fold_of, folds), weighting, &target);
+        let Some([always, _]) = parts.pop() else { break };
+        let whole = parts.iter().fold(always, |sum, [part, _]| sum.add(part));
         let mut near: Option<Vec<f64>> = None;
         let mut squares = Vec::new();
-        for (part, held_out) in &parts {
-            let mut gram = &whole - &part.gram;
+        for [part, held_out] in &parts {
+            let mut gram = &whole.gram - &part.gram;
             prior::add(grid, &mut gram);
-            let rhs: Vec<f64> = whole_rhs.iter().zip(&part.rhs[0]).map(|(sum, b)| sum - b).collect();
+            let rhs: Vec<f64> = whole.rhs[0].iter().zip(&part.rhs[0]).map(|(sum, b)| sum - b).collect();
             interrupt::point();
             let solved = match &near {
                 Some(near) => nnls::solve_from(&gram, &rhs, near),
@@ -156,20 +141,20 @@ fn choose(record: &Record, drive: [f64; 2], dead_time: DeadTime, findings: &mut 
         }
     }
     if errors.is_empty() {
-        findings.add(
+        let message = "no grid could be fitted with curves held out".to_owned();
+        return findings.refuse(
             codes::NOT_DETERMINED,
             None,
-            "no grid could be fitted with curves held out".to_owned(),
+            message,
             "give the grid with --grid, or record more reversal curves",
         );
-        return None;
     }
-    let (bottom, top) = super::statistics::extent(&record.displacement[used.first..]);
+    let (bottom, top) = extent(&record.displacement[used.first..]);
     Some(decide(&errors, folds, levels, 1.0 / scale, top - bottom))
 }
 
-/// Normal equations of the branches that are always fitted, and of each fold: with the weights of the fit, and with
-/// equal weights for the score. One pass, over at most [`SAMPLES`] samples.
+/// Normal equations of each fold, and last those of the branches that are always fitted: with the weights of the fit, and
+/// with equal weights for the score. One pass, over at most [`SAMPLES`] samples.
 fn sums(
     plane: &Plane,
     record: &Record,
@@ -177,39 +162,20 @@ fn sums(
     (branches, fold_of, folds): (&[Branch], &[Option<usize>], usize),
     weighting: Weighting,
     target: &[f64],
-) -> (Normal, Vec<(Normal, Normal)>) {
-    let new = || Sums::new(plane.nodes(), 1);
-    let mut always = new();
-    let mut parts: Vec<(Sums, Sums)> = (0..folds).map(|_| (new(), new())).collect();
+) -> Vec<[Normal; 2]> {
+    let new = |_| [Sums::new(plane.nodes(), 1), Sums::new(plane.nodes(), 1)];
+    let mut parts: Vec<[Sums; 2]> = (0..=folds).map(new).collect();
     let every = (record.time.len() - first).div_ceil(SAMPLES);
-    walk(
-        plane,
-        record,
-        first,
-        branches,
-        |k| k.is_multiple_of(every),
-        |step| match step {
-            Step::Sample(branch, k, row) => {
-                let (y, weight) = ([target[k]], weight(weighting, plane, record, k));
-                match fold_of[branch] {
-                    None => always.add(row, &y, weight),
-                    Some(fold) => {
-                        parts[fold].0.add(row, &y, weight);
-                        parts[fold].1.add(row, &y, 1.0);
-                    }
-                }
-            }
-            Step::End(branch) => match fold_of[branch] {
-                None => always.close_branch(),
-                Some(fold) => {
-                    parts[fold].0.close_branch();
-                    parts[fold].1.close_branch();
-                }
-            },
-        },
-    );
-    let over = |(fitted, scored): (Sums, Sums)| (fitted.over_weights(plane), scored.over_weights(plane));
-    (always.over_weights(plane), parts.into_iter().map(over).collect())
+    let visit = |step: Step| match step {
+        Step::Sample(branch, k, row) => {
+            let [fitted, scored] = &mut parts[fold_of[branch].unwrap_or(folds)];
+            fitted.add(row, &[target[k]], weight(weighting, plane, record, k));
+            scored.add(row, &[target[k]], 1.0);
+        }
+        Step::End(branch) => parts[fold_of[branch].unwrap_or(folds)].iter_mut().for_each(Sums::close_branch),
+    };
+    walk(plane, record, first, branches, |k| k.is_multiple_of(every), visit);
+    parts.into_iter().map(|pair| pair.map(|sums| sums.over_weights(plane))).collect()
 }
 
 /// Mean square of the held-out samples, each branch with its own offset, in units of the target squared.
@@ -255,16 +221,12 @@ fn deal(record: &Record, branches: &[Branch], drive: [f64; 2]) -> (Vec<Option<us
 /// Applies the rule to the mean squares of each grid and fold; `unit` is the unit of the target, `range` that of the
 /// displacement after the skipped samples, m.
 fn decide(errors: &[(usize, Vec<f64>)], folds: usize, levels: usize, unit: f64, range: f64) -> GridChoice {
-    let count = folds as f64;
-    let mean = |values: &[f64]| values.iter().fold(0.0, |sum, v| sum + v) / count;
     let best = errors.iter().fold(&errors[0], |best, e| if mean(&e.1) < mean(&best.1) { e } else { best });
     let mut chosen = best.0;
     let mut scores = Vec::new();
     for (grid, squares) in errors {
         let worse: Vec<f64> = squares.iter().zip(&best.1).map(|(a, b)| a.sqrt() - b.sqrt()).collect();
-        let excess = mean(&worse);
-        let spread = worse.iter().fold(0.0, |sum, d| sum + (d - excess) * (d - excess)) / (count - 1.0);
-        let standard_error = (spread / count).sqrt();
+        let (excess, standard_error) = mean_and_error(&worse);
         if excess <= standard_error && *grid < chosen {
             chosen = *grid;
         }

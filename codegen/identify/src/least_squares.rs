@@ -19,7 +19,6 @@ pub struct Fit {
 #[must_use]
 pub fn fit(columns: &[&[f64]], y: &[f64]) -> Option<Fit> {
     let n = columns.len();
-    let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).fold(0.0, |sum, (x, z)| sum + x * z);
     let mut scale = Vec::with_capacity(n);
     for column in columns {
         let length = dot(column, column).sqrt();
@@ -43,6 +42,11 @@ pub fn fit(columns: &[&[f64]], y: &[f64]) -> Option<Fit> {
         .map(|k| columns.iter().zip(&coefficients).fold(y[k], |rest, (column, c)| rest - c * column[k]))
         .collect();
     Some(Fit { coefficients, covariance, residual })
+}
+
+/// Sum of the products, in order.
+pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).fold(0.0, |sum, (x, z)| sum + x * z)
 }
 
 /// Mean of the squares; 0 for none.

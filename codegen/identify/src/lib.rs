@@ -26,6 +26,7 @@ mod coverage;
 mod dead_time;
 pub mod declared;
 mod distrust;
+mod estimate;
 pub mod everett;
 mod export;
 mod file;
@@ -54,15 +55,11 @@ pub mod states;
 mod statistics;
 pub mod stiffness;
 mod sweep;
-mod time_unit;
-mod trace;
-mod trend;
 pub mod waveform;
 
 use crate::everett::EverettTable;
 use findings::Findings;
 use mode::Mode;
-use normal::Normal;
 use residual::Residual;
 use specgen_language::diagnostic::{Diagnostic, codes};
 use specgen_numerics::nnls;
@@ -70,17 +67,19 @@ use specgen_numerics::nnls;
 pub use cause::{Cause, Source};
 pub use columns::{SIMULATED, is_simulated, marked_as_simulated};
 pub use coverage::Region;
+pub use estimate::{Estimate, Parameter};
 pub use export::{is_table_csv, read_table_csv, write_table_csv};
 pub use file::{MAX_FILE_BYTES, read_file};
 pub use grid_choice::{GridChoice, Score, choose_grid};
-pub use rate::predict::{Drive, Prediction, PredictionError, parse_drive, predict, read_drive, validate};
+pub use rate::predict::{Drive, Prediction, PredictionError, predict, read_drive, validate};
 pub use reading::Reading;
 pub use record::{Record, parse_record, read_record};
 pub use report::{Branches, Report};
+pub use residual::Trace;
+pub use signals::Input;
 pub use specgen_language::model::MAX_GRID;
 pub use staircase::Staircase;
 pub use statistics::extent;
-pub use trace::Trace;
 
 /// What to identify.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -137,15 +136,10 @@ const POOR_FIT_PERCENT: f64 = 3.0;
 /// All findings if the record cannot identify the table: unit or range that contradict `options.drive`, parts of the
 /// range that are never reached, too few reversal curves.
 pub fn identify(record: &Record, options: &Options) -> Result<Identification, Vec<Diagnostic>> {
-    let mut findings = Findings::new(&record.shown_as);
+    let mut findings = Findings::after(&record.shown_as, &record.warnings);
     let found = identify_checked(record, options, &mut findings);
-    let refused = findings.any_error();
-    let mut all = record.warnings.clone();
-    all.extend(findings.into_diagnostics());
-    match found {
-        Some((table, report, trace)) if !refused => Ok(Identification { table, report, trace, warnings: all }),
-        _ => Err(all),
-    }
+    let ((table, report, trace), warnings) = findings.conclude(found)?;
+    Ok(Identification { table, report, trace, warnings })
 }
 
 fn identify_checked(
@@ -177,7 +171,10 @@ fn identify_checked(
     let unexcited = coverage::check_excited(&plane, &excited, findings);
 
     prior::add(plane.grid, &mut normal.gram);
-    let solution = solve(&normal, findings)?;
+    // Non-negative weights, in units of the target.
+    let solution = nnls::solve(&normal.gram, &normal.rhs[0])
+        .map_err(|failure| normal::report_undetermined(&failure, findings))
+        .ok()?;
     let table = normal::table_of(&plane, &solution.weights, 1.0 / scale);
 
     let residual = Residual::of(&plane, record, &used, &displacement, &table);
@@ -186,7 +183,7 @@ fn identify_checked(
         Branches::All => used.branches.clone(),
     };
     let percent = 100.0 / residual.range;
-    let (fit_rms, fit_max) = trend::rms_and_max(&residual.detrended);
+    let (fit_rms, fit_max) = statistics::rms_and_max(&residual.detrended);
     let branch_rms = residual.within(&fitted_branches, used.first);
     let noise_floor = statistics::noise_floor(&record.displacement[used.first..]);
     let gain = residual.range / (plane.range[1] - plane.range[0]);
@@ -228,24 +225,9 @@ fn identify_checked(
     sweep::check(&plane, record, &used, &report, findings);
     if report.fit_rms_percent > POOR_FIT_PERCENT {
         let message = format!("the fitted table misses the record by {:.2} % rms of its range", report.fit_rms_percent);
-        findings.add(
-            codes::POOR_FIT,
-            None,
-            message,
-            "is the record one actuator at one load, without steps or lost samples?",
-        );
+        let help = "is the record one actuator at one load, without steps or lost samples?";
+        findings.add(codes::POOR_FIT, None, message, help);
     }
     let trace = residual.trace(record, used.first, &displacement);
     Some((table, report, trace))
-}
-
-/// Non-negative weights in units of the target.
-fn solve(normal: &Normal, findings: &mut Findings) -> Option<nnls::Solution> {
-    nnls::solve(&normal.gram, &normal.rhs[0])
-        .map_err(|failure| {
-            let message = format!("the weights cannot be determined ({failure:?})");
-            let help = "choose a smaller grid, or record more reversal curves";
-            findings.add(codes::NOT_DETERMINED, None, message, help);
-        })
-        .ok()
 }

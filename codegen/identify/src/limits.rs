@@ -72,12 +72,9 @@ pub(crate) fn check(lines: &LineNumbers, time: &[f64], drive: &[f64], displaceme
                 drive[from],
                 drive[to]
             );
-            findings.add(
-                codes::RECORD_LIMITED,
-                Some(lines.at(from)),
-                message,
-                "check the range of the gauge, the limit of the amplifier and the preload; record again within them",
-            );
+            let help =
+                "check the range of the gauge, the limit of the amplifier and the preload; record again within them";
+            findings.add(codes::RECORD_LIMITED, Some(lines.at(from)), message, help);
         }
     }
 }

@@ -4,9 +4,9 @@
 use serde::Serialize;
 
 use super::findings::Findings;
-use super::least_squares::fit;
+use super::least_squares::{fit, mean_square};
 use super::record::Record;
-use super::statistics::extent;
+use super::statistics::{centred, extent, mean_and_error, median};
 use specgen_language::diagnostic::{Diagnostic, codes};
 use specgen_numerics::{ewma_limit, pcc_limit};
 
@@ -73,10 +73,8 @@ const WIDTHS: usize = 40;
 /// E0625 if the record holds no whole cycle, E0626 if its cycles are not alike or contradict `frequency`.
 pub fn relation(record: &Record, frequency: Option<f64>) -> Result<Relation, Vec<Diagnostic>> {
     let mut findings = Findings::new(&record.shown_as);
-    match relation_checked(record, frequency, &mut findings) {
-        Some(relation) if !findings.any_error() => Ok(relation),
-        _ => Err(findings.into_diagnostics()),
-    }
+    let relation = relation_checked(record, frequency, &mut findings);
+    findings.conclude(relation).map(|(relation, _)| relation)
 }
 
 fn relation_checked(record: &Record, frequency: Option<f64>, findings: &mut Findings) -> Option<Relation> {
@@ -92,19 +90,14 @@ fn relation_checked(record: &Record, frequency: Option<f64>, findings: &mut Find
                 record.time[record.time.len() - 1],
                 starts.len()
             );
-            findings.add(
-                codes::NO_CYCLE,
-                None,
-                message,
-                "record two cycles or more, or give --frequency for a record of exactly one cycle",
-            );
-            return None;
+            let help = "record two cycles or more, or give --frequency for a record of exactly one cycle";
+            return findings.refuse(codes::NO_CYCLE, None, message, help);
         };
         let end = record.time.iter().rposition(|t| *t <= record.time[0] + 1.0001 / frequency)?;
         return line(record, frequency, false, &[0, end], findings);
     }
     let mut periods: Vec<f64> = crossings.windows(2).map(|w| w[1] - w[0]).collect();
-    let typical = super::statistics::median(&mut periods);
+    let typical = median(&mut periods);
     if let Some(k) = crossings.windows(2).position(|w| ((w[1] - w[0]) / typical - 1.0).abs() > STEADY) {
         let message = format!(
             "the cycle from {} s to {} s lasts {:.4e} s, the others {typical:.4e} s: the record has no one frequency",
@@ -112,13 +105,8 @@ fn relation_checked(record: &Record, frequency: Option<f64>, findings: &mut Find
             crossings[k + 1],
             crossings[k + 1] - crossings[k]
         );
-        findings.add(
-            codes::FREQUENCY_UNCLEAR,
-            None,
-            message,
-            "record each frequency by itself: sines or triangles of one amplitude",
-        );
-        return None;
+        let help = "record each frequency by itself: sines or triangles of one amplitude";
+        return findings.refuse(codes::FREQUENCY_UNCLEAR, None, message, help);
     }
     let found = (crossings.len() - 1) as f64 / (crossings[crossings.len() - 1] - crossings[0]);
     if let Some(given) = frequency.filter(|given| (given / found - 1.0).abs() > STEADY) {
@@ -126,13 +114,8 @@ fn relation_checked(record: &Record, frequency: Option<f64>, findings: &mut Find
             "the drive has {found:.4} Hz (cycle from {} s to {} s), but {given} Hz was given",
             crossings[0], crossings[1]
         );
-        findings.add(
-            codes::FREQUENCY_UNCLEAR,
-            None,
-            message,
-            "give the frequencies in the order of the records, or leave --frequency out",
-        );
-        return None;
+        let help = "give the frequencies in the order of the records, or leave --frequency out";
+        return findings.refuse(codes::FREQUENCY_UNCLEAR, None, message, help);
     }
     // The first cycle is for settling, if there are others.
     let from = usize::from(starts.len() > 3);
@@ -174,25 +157,20 @@ fn line(
     };
     let Some((found, x, y)) = straight(first, end) else {
         let message = format!("from {} s to {} s the drive hardly moves", record.time[first], record.time[end]);
-        findings.add(codes::NO_CYCLE, None, message, "record whole cycles of the drive");
-        return None;
+        return findings.refuse(codes::NO_CYCLE, None, message, "record whole cycles of the drive");
     };
     let count = x.len() as f64;
-    let square = super::least_squares::mean_square(&found.residual);
+    let square = mean_square(&found.residual);
     let each: Vec<f64> =
         starts.windows(2).filter_map(|w| straight(w[0], w[1])).map(|(found, ..)| found.coefficients[1]).collect();
     let gain_error = if each.len() >= 3 {
-        let mean = each.iter().fold(0.0, |sum, g| sum + g) / each.len() as f64;
-        let spread = each.iter().fold(0.0, |sum, g| sum + (g - mean) * (g - mean)) / (each.len() - 1) as f64;
-        (spread / each.len() as f64).sqrt()
+        mean_and_error(&each).1
     } else {
         // The loop is not noise: the residual of the line counts as one sample per branch.
         (square * found.covariance[(1, 1)] * count / (2.0 * (starts.len() - 1) as f64)).sqrt()
     };
-    let mean_y = y.iter().fold(0.0, |sum, v| sum + v) / count;
-    let spread_y = y.iter().fold(0.0, |sum, v| sum + (v - mean_y) * (v - mean_y)) / count;
-    let unexplained = square / spread_y;
     let (bottom, top) = extent(&y);
+    let unexplained = square / mean_square(&centred(y));
     let loop_width = widest(record, first, end, found.coefficients[1]);
     Some(Relation {
         record: record.shown_as.clone(),

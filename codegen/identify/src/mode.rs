@@ -10,7 +10,7 @@
 use serde::Serialize;
 
 use crate::least_squares::{fit, mean_square};
-use crate::statistics;
+use crate::statistics::extent;
 
 /// A second-order mode.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -127,7 +127,7 @@ const REFINED: usize = 40;
 /// rings.
 #[must_use]
 pub fn ring(time: &[f64], drive: &[f64], displacement: &[f64]) -> Option<Ring> {
-    let (low, high) = statistics::extent(drive);
+    let (low, high) = extent(drive);
     let mut rests = rests(drive, 1e-3 * (high - low));
     rests.sort_by_key(|(from, to)| core::cmp::Reverse(to - from));
     rests.truncate(RESTS);

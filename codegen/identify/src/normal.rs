@@ -8,11 +8,14 @@ mod sums;
 use nalgebra::DMatrix;
 
 use super::branches::Branch;
+use super::findings::Findings;
 use super::record::Record;
 use super::regressor::{Plane, Term};
 use super::staircase::Staircase;
 use crate::everett::EverettTable;
+use specgen_language::diagnostic::codes;
 use specgen_language::interrupt;
+use specgen_numerics::nnls::Failure;
 
 pub(super) use sums::Sums;
 
@@ -30,13 +33,21 @@ pub struct Normal {
     pub samples: usize,
 }
 
-/// Calls `visit(sample, row)` for every sample from `first` on, with negative saturation before it.
-pub fn each_row(plane: &Plane, drive: &[f64], first: usize, visit: impl FnMut(usize, &[Term])) {
-    each_row_from(Staircase::negative_saturation(plane.range), plane, drive, first, visit);
+impl Normal {
+    /// The sum with another one of the same shape.
+    pub fn add(mut self, other: &Self) -> Self {
+        self.gram += &other.gram;
+        for (own, more) in self.rhs.iter_mut().zip(&other.rhs) {
+            own.iter_mut().zip(more).for_each(|(a, b)| *a += b);
+        }
+        self.energy.iter_mut().zip(&other.energy).for_each(|(a, b)| *a += b);
+        self.samples += other.samples;
+        self
+    }
 }
 
-/// Like [`each_row`], with another memory before sample `first`.
-pub fn each_row_from(
+/// Calls `visit(sample, row)` for every sample from `first` on; `memory` is the state before it.
+pub fn each_row(
     mut memory: Staircase,
     plane: &Plane,
     drive: &[f64],
@@ -159,6 +170,12 @@ pub fn accumulate(
         Step::End(_) => sums.close_branch(),
     });
     sums.over_weights(plane)
+}
+
+/// Reports normal equations that have no solution.
+pub(crate) fn report_undetermined(failure: &Failure, findings: &mut Findings) {
+    let message = format!("the weights cannot be determined ({failure:?})");
+    findings.add(codes::NOT_DETERMINED, None, message, "choose a smaller grid, or record more reversal curves");
 }
 
 /// Cell weights to Everett nodes, in place: E(i, j) is the sum of the weights with up ≤ i, down ≥ j.

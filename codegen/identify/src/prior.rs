@@ -12,11 +12,11 @@ const SMOOTHNESS: f64 = 1e-6;
 /// Share of the mean diagonal that keeps the matrix positive definite in floating point.
 const RIDGE: f64 = 1e-12;
 
-/// Adds the penalty to `gram` (both triangles) and returns its strength, in the unit of `gram`.
+/// Adds the penalty to `gram` (both triangles).
 ///
 /// Neighbours share an edge in the plane. The triangles on the diagonal include the reversible part and are much
 /// heavier than the cells beside them: they are neighbours only of each other.
-pub fn add(grid: usize, gram: &mut DMatrix<f64>) -> f64 {
+pub fn add(grid: usize, gram: &mut DMatrix<f64>) {
     let count = gram.nrows();
     let mean = (0..count).fold(0.0, |sum, k| sum + gram[(k, k)]) / count as f64;
     let strength = SMOOTHNESS * mean;
@@ -40,7 +40,6 @@ pub fn add(grid: usize, gram: &mut DMatrix<f64>) -> f64 {
             }
         }
     }
-    strength
 }
 
 fn tie(gram: &mut DMatrix<f64>, a: usize, b: usize, strength: f64) {

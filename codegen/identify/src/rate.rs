@@ -19,13 +19,11 @@ mod fit;
 pub(crate) mod forward;
 mod joint;
 mod mixed;
-mod normal;
 mod open_weight;
 pub mod period;
 pub(crate) mod predict;
 mod prepare;
 mod report;
-mod score;
 pub(crate) mod start;
 mod table;
 
@@ -35,7 +33,7 @@ use specgen_language::diagnostic::Diagnostic;
 use super::findings::Findings;
 use super::mode::{self, Mode, Ring};
 use super::record::Record;
-use super::{Options, coverage, time_unit};
+use super::{Options, coverage, sweep};
 
 pub use export::{read_rate_csv, spec_lines, write_rate_csv};
 pub use report::{HoldOut, OptionReport, RateRecord, RateReport, Verdict};
@@ -166,11 +164,10 @@ pub fn identify_rate(
     }
     let Some(plane) = plane.filter(|_| !refused) else { return Err(all) };
     let shown = records.first().map_or("", |record| &record.shown_as);
-    let mut findings = Findings::new(shown);
+    let mut findings = Findings::after(shown, &all);
     prepare::check_rates(&prepared, &mut findings);
     if findings.any_error() {
-        all.extend(findings.into_diagnostics());
-        return Err(all);
+        return Err(findings.into_diagnostics());
     }
     let mode = options.mode.or_else(|| rings(records));
     let everything: Vec<usize> = (0..prepared.len()).collect();
@@ -181,20 +178,14 @@ pub fn identify_rate(
         left_out.push(fit::all(&plane, &prepared, &others, mode, &mut findings));
     }
     let (Some(models), Some(left_out)) = (fitted, left_out.into_iter().collect::<Option<Vec<_>>>()) else {
-        all.extend(findings.into_diagnostics());
-        return Err(all);
+        return Err(findings.into_diagnostics());
     };
     let longest = models.iter().map(|model| model.dead_time).max_by(f64::total_cmp);
-    time_unit::check_dead_time(longest.unwrap_or_default(), &mut findings);
-    let report = match report::report(&plane, &prepared, &models, &left_out, mode, hold_out) {
-        Ok(report) => report,
-        Err(found) => {
-            all.extend(found);
-            return Err(all);
-        }
-    };
-    all.extend(findings.into_diagnostics());
-    Ok(RateIdentification { models: RateOption::ALL.into_iter().zip(models).collect(), report, warnings: all })
+    sweep::check_dead_time(longest.unwrap_or_default(), &mut findings);
+    let report = report::report(&plane, &prepared, &models, &left_out, mode, hold_out)
+        .map_err(|found| all.into_iter().chain(found).collect::<Vec<_>>())?;
+    let models = RateOption::ALL.into_iter().zip(models).collect();
+    Ok(RateIdentification { models, report, warnings: findings.into_diagnostics() })
 }
 
 /// The mode of the clearest ring in any of the records.

@@ -1,6 +1,6 @@
 //! The user's description of the columns of bench files.
 
-use super::columns::names::{self, Quantity};
+use super::columns::names::{QUANTITIES, Quantity};
 
 /// How to read records whose names are not standard. By default, by their names.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -68,15 +68,15 @@ fn chosen(text: &str) -> Result<ColumnChoice, String> {
     if name == SAMPLE {
         return Ok(ColumnChoice { quantity: SAMPLE, per: 1.0, column });
     }
-    let found = names::all().find_map(|quantity: &Quantity| quantity.per_of(name).map(|per| (quantity.name, per)));
+    let found = QUANTITIES.iter().find_map(|quantity: &Quantity| quantity.per_of(name).map(|per| (quantity.name, per)));
     match found {
         Some((quantity, per)) => Ok(ColumnChoice { quantity, per, column }),
         None => {
             let plain = name.split('_').next().unwrap_or(name);
-            let near = names::all().find(|quantity| quantity.plain().eq_ignore_ascii_case(plain));
+            let near = QUANTITIES.iter().find(|quantity| quantity.plain().eq_ignore_ascii_case(plain));
             let known = near.map_or_else(
                 || {
-                    names::all().map(|quantity| format!("`{}`", quantity.name)).collect::<Vec<_>>().join(", ")
+                    QUANTITIES.iter().map(|quantity| format!("`{}`", quantity.name)).collect::<Vec<_>>().join(", ")
                         + ", `sample`"
                 },
                 Quantity::all_names,

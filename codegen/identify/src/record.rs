@@ -10,19 +10,12 @@ use super::distrust;
 use super::file::open_file;
 use super::findings::Findings;
 use super::reading::Reading;
-use super::signals::{self, ColumnSpec};
+use super::signals::{self, ColumnSpec, MONITOR, Signals, optional, required};
 use super::{sanity, statistics};
 use specgen_language::diagnostic::{Diagnostic, codes};
 
-/// Time of the sample, s.
-pub(crate) const TIME: usize = 0;
-/// Drive, V.
-pub(crate) const DRIVE: usize = 1;
-/// Displacement, µm.
-pub(crate) const DISPLACEMENT: usize = 2;
-
-/// Header names in the order of [`TIME`], [`DRIVE`], [`DISPLACEMENT`].
-pub(crate) const NAMES: [&str; 3] = ["time_s", "drive_V", "displacement_um"];
+/// Header names of time, drive and displacement.
+const NAMES: [&str; 3] = ["time_s", "drive_V", "displacement_um"];
 
 /// A measured record in SI units, checked sample by sample.
 ///
@@ -66,7 +59,7 @@ impl Record {
             findings.add(codes::RECORD_LENGTHS, None, message, "give columns of equal length");
             return Err(findings.into_diagnostics());
         }
-        for (column, name) in [(&time, NAMES[TIME]), (&drive, NAMES[DRIVE]), (&displacement, NAMES[DISPLACEMENT])] {
+        for (column, name) in [&time, &drive, &displacement].into_iter().zip(NAMES) {
             for (k, x) in column.iter().enumerate().filter(|(_, x)| !x.is_finite()) {
                 RECORD.report_not_finite(k + 2, name, &x.to_string(), &mut findings);
             }
@@ -112,27 +105,28 @@ pub fn parse_record(text: &str, shown_as: &str) -> Result<Record, Vec<Diagnostic
 
 /// Columns of a record; the displacement is optional in a record for prediction.
 pub(crate) const fn wanted(displacement: bool) -> [ColumnSpec; 4] {
-    [
-        ColumnSpec { name: NAMES[TIME], required: true },
-        ColumnSpec { name: NAMES[DRIVE], required: true },
-        ColumnSpec { name: signals::MONITOR, required: false },
-        ColumnSpec { name: NAMES[DISPLACEMENT], required: displacement },
-    ]
+    let [time, drive, moved] = NAMES;
+    let moved = ColumnSpec { name: moved, required: displacement };
+    [required(time), required(drive), optional(MONITOR), moved]
+}
+
+/// Time (s), drive (V), whether that was measured, and displacement (m) of signals with the [`wanted`] columns.
+pub(crate) fn quantities(signals: &mut Signals) -> (Vec<f64>, Vec<f64>, bool, Option<Vec<f64>>) {
+    let mut take = |k: usize| signals.columns[k].take();
+    let (time, command, monitor, micrometres) = (take(0), take(1), take(2), take(3));
+    let monitored = command.is_none();
+    let displacement = micrometres.map(|um| um.iter().map(|y| y * 1e-6).collect());
+    (time.unwrap_or_default(), command.or(monitor).unwrap_or_default(), monitored, displacement)
 }
 
 fn of_source(source: impl Read, reading: &Reading, mut findings: Findings) -> Result<Record, Vec<Diagnostic>> {
     let Some(mut signals) = signals::columns_of(source, &wanted(true), reading, &mut findings) else {
         return Err(findings.into_diagnostics());
     };
-    let shown_as = signals.shown_as.clone();
-    let (monitored, simulated) = (signals.columns[DRIVE].is_none(), signals.simulated);
-    let mut take = |k: usize| signals.columns[k].take();
-    let (time, drive, monitor, micrometres) = (take(0), take(1), take(2), take(3));
-    let (time, drive) = (time.unwrap_or_default(), drive.or(monitor).unwrap_or_default());
-    let mut displacement = micrometres.unwrap_or_default();
-    displacement.iter_mut().for_each(|y| *y *= 1e-6);
-    let record = finish(findings, &shown_as, &signals.lines, [time, drive, displacement])?;
-    Ok(Record { monitored, simulated, ..record })
+    let (time, drive, monitored, displacement) = quantities(&mut signals);
+    let columns = [time, drive, displacement.unwrap_or_default()];
+    let record = finish(findings, &signals.shown_as, &signals.lines, columns)?;
+    Ok(Record { monitored, simulated: signals.simulated, ..record })
 }
 
 /// Longest plausible hold of a converter, s: a record sampled more slowly does not contain every command.
@@ -140,8 +134,7 @@ const LONGEST_HOLD: f64 = 1e-3;
 
 /// Half of the median sampling interval, s; 0 if that is too long for a converter.
 pub(crate) fn hold(time: &[f64]) -> f64 {
-    let mut intervals: Vec<f64> = time.windows(2).map(|w| w[1] - w[0]).collect();
-    let interval = statistics::median(&mut intervals);
+    let interval = statistics::median_interval(time);
     if interval > LONGEST_HOLD { 0.0 } else { 0.5 * interval }
 }
 

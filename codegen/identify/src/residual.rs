@@ -1,13 +1,27 @@
-//! Residual of a fitted table on its own record.
+//! Residual of a fitted table on its own record, and its samples for drawing.
 
 use super::branches::Branch;
 use super::cause::{self, Cause};
+use super::normal;
 use super::record::Record;
 use super::regressor::{self, Plane};
 use super::selection::RecordSpan;
-use super::trace::Trace;
-use super::{normal, statistics, trend};
+use super::staircase::Staircase;
+use super::statistics::{self, Line};
 use crate::everett::EverettTable;
+
+/// Samples of an identification or a validation: columns of equal length.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Trace {
+    /// Time of each sample, s.
+    pub time: Vec<f64>,
+    /// Drive of each sample, V.
+    pub drive: Vec<f64>,
+    /// Displacement shifted by the dead time, m.
+    pub measured: Vec<f64>,
+    /// Displacement minus model, offset and drift, m; NaN for a sample without weight.
+    pub residual: Vec<f64>,
+}
 
 /// Displacement minus model, from the first used sample on.
 pub(crate) struct Residual {
@@ -16,7 +30,7 @@ pub(crate) struct Residual {
     /// Without `line`, of the samples with weight, m.
     pub(crate) detrended: Vec<f64>,
     /// Offset (m) and linear drift (m/s) of `plain`.
-    pub(crate) line: trend::Line,
+    pub(crate) line: Line,
     /// Difference of the largest and the smallest displacement, m.
     pub(crate) range: f64,
 }
@@ -31,7 +45,7 @@ impl Residual {
         table: &EverettTable,
     ) -> Self {
         let mut plain = Vec::with_capacity(displacement.len() - used.first);
-        normal::each_row(plane, &record.drive, used.first, |k, row| {
+        normal::each_row(Staircase::negative_saturation(plane.range), plane, &record.drive, used.first, |k, row| {
             plain.push(displacement[k] - regressor::evaluate(row, &table.nodes));
         });
         let believed = |values: &[f64]| -> Vec<f64> {
@@ -39,8 +53,8 @@ impl Residual {
             paired.take(used.end - used.first).filter(|(_, weightless)| !**weightless).map(|(v, _)| *v).collect()
         };
         let (time, kept) = (believed(&record.time[used.first..]), believed(&plain));
-        let line = trend::Line::fit(&time, &kept);
-        let detrended = kept.iter().zip(&time).map(|(r, t)| r - line.at(*t)).collect();
+        let line = Line::fit(&time, &kept);
+        let detrended = line.removed(&time, &kept);
         let (low, high) = statistics::extent(&believed(&displacement[used.first..]));
         // After the end the displacement is not known.
         plain[used.end - used.first..].fill(f64::NAN);
@@ -68,7 +82,7 @@ impl Residual {
         let (mut sum, mut count) = (0.0, 0.0);
         for branch in branches {
             let part = &self.plain[branch.first - first..branch.end - first];
-            let mean = part.iter().fold(0.0, |s, r| s + r) / part.len() as f64;
+            let mean = statistics::mean(part);
             sum = part.iter().fold(sum, |s, r| s + (r - mean) * (r - mean));
             count += part.len() as f64;
         }

@@ -9,27 +9,20 @@
 mod fit;
 mod welch;
 
-use std::path::Path;
-
 use serde::Serialize;
 
+use super::estimate::{self, Estimate};
 use super::findings::Findings;
-use super::reading::Reading;
-use super::signals::{self, ColumnSpec, Signals};
-use super::statistics::{extent, median};
+use super::signals::{ColumnSpec, Input, Signals, required};
+use super::statistics::{Standstill, extent, median, median_interval, standstills};
 use specgen_language::diagnostic::{Diagnostic, codes};
 
-pub use fit::response;
-pub use fit::{Estimate, ResonanceFit};
+pub use fit::{ResonanceFit, response};
 pub use welch::Bin;
 
 /// A response and its fit.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct ResponseReport {
-    /// Name of the record.
-    pub record: String,
-    /// Whether a comment in it marks it as simulated.
-    pub simulated: bool,
+pub struct FrequencyResponse {
     /// Samples per second.
     pub rate: f64,
     /// Samples in a segment.
@@ -51,9 +44,6 @@ pub struct ResponseReport {
     /// Bins from zero up, for drawing.
     #[serde(skip)]
     pub bins: Vec<Bin>,
-    /// Findings that refuse nothing.
-    #[serde(skip)]
-    pub warnings: Vec<Diagnostic>,
 }
 
 /// A band of frequencies, Hz.
@@ -87,11 +77,7 @@ const POOR: f64 = 15.0;
 /// Narrower bands, in bins, are not named separately.
 const NARROW: usize = 3;
 
-const COLUMNS: [ColumnSpec; 3] = [
-    ColumnSpec { name: "time_s", required: true },
-    ColumnSpec { name: "drive_V", required: true },
-    ColumnSpec { name: "displacement_um", required: true },
-];
+const COLUMNS: [ColumnSpec; 3] = [required("time_s"), required("drive_V"), required("displacement_um")];
 
 /// Identifies from a record of a swept sine, multisine or noise. `segment`: samples in a segment, a power of two is best.
 ///
@@ -99,31 +85,14 @@ const COLUMNS: [ColumnSpec; 3] = [
 /// E0630 for a record that is too short or not sampled evenly, E0631 if the coherence is too low (the bands are named),
 /// E0632 if the model cannot be fitted, and those of reading.
 pub fn respond(
-    path: &Path,
+    input: Input,
     shown_as: &str,
     segment: Option<usize>,
-    reading: &Reading,
-) -> Result<ResponseReport, Vec<Diagnostic>> {
-    of_signals(&signals::read(path, shown_as, &COLUMNS, reading)?, segment)
+) -> Result<Estimate<FrequencyResponse>, Vec<Diagnostic>> {
+    estimate::of(input, shown_as, &COLUMNS, |signals, findings| respond_checked(signals, segment, findings))
 }
 
-/// The same from the text of a record.
-///
-/// # Errors
-/// As [`respond`].
-pub fn respond_text(text: &str, shown_as: &str, segment: Option<usize>) -> Result<ResponseReport, Vec<Diagnostic>> {
-    of_signals(&signals::parse(text, shown_as, &COLUMNS)?, segment)
-}
-
-fn of_signals(signals: &Signals, segment: Option<usize>) -> Result<ResponseReport, Vec<Diagnostic>> {
-    let mut findings = Findings::new(&signals.shown_as);
-    let report = responded(signals, segment, &mut findings);
-    let (mut report, warnings) = findings.conclude(report)?;
-    report.warnings = warnings;
-    Ok(report)
-}
-
-fn responded(signals: &Signals, segment: Option<usize>, findings: &mut Findings) -> Option<ResponseReport> {
+fn respond_checked(signals: &Signals, segment: Option<usize>, findings: &mut Findings) -> Option<FrequencyResponse> {
     let rate = sampling_rate(signals, findings)?;
     check_limits(signals, findings);
     if findings.any_error() {
@@ -138,13 +107,8 @@ fn responded(signals: &Signals, segment: Option<usize>, findings: &mut Findings)
             signals.place(0),
             signals.place(n - 1)
         );
-        findings.add(
-            codes::RESPONSE_SAMPLES,
-            None,
-            message,
-            "record longer, or choose a shorter --segment (32 or more)",
-        );
-        return None;
+        let help = "record longer, or choose a shorter --segment (32 or more)";
+        return findings.refuse(codes::RESPONSE_SAMPLES, None, message, help);
     }
     let micrometres = signals.column(2);
     let displacement: Vec<f64> = micrometres.iter().map(|y| y * 1e-6).collect();
@@ -156,8 +120,7 @@ fn responded(signals: &Signals, segment: Option<usize>, findings: &mut Findings)
     let bands = left_out(&bins, &usable, &excited);
     if used.len() < BINS {
         let message = format!("the coherence is below {COHERENT} nearly everywhere: {}", named(&bands));
-        findings.add(codes::RESPONSE_COHERENCE, None, message, "drive harder within the linear range, record longer, and check both channels; coherence is lost to noise, to hysteresis at large amplitude and to a wrong channel");
-        return None;
+        return findings.refuse(codes::RESPONSE_COHERENCE, None, message, "drive harder within the linear range, record longer, and check both channels; coherence is lost to noise, to hysteresis at large amplitude and to a wrong channel");
     }
     let fitted = fit::fit(&used, averages).map_err(|why| {
         findings.add(codes::RESPONSE_FIT, None, why, "does the record hold the response from well below to above the resonance, displacement rising with the drive?");
@@ -181,17 +144,11 @@ fn responded(signals: &Signals, segment: Option<usize>, findings: &mut Findings)
     let misfit_percent = 100.0 * fit::misfit(&fitted, &used, averages);
     if misfit_percent > POOR {
         let message = format!("the fitted model misses the response by {misfit_percent:.0} % rms");
-        findings.add(
-            codes::RESPONSE_POOR,
-            None,
-            message,
-            "is there more than one resonance in the band? Limit the sweep to the first one",
-        );
+        let help = "is there more than one resonance in the band? Limit the sweep to the first one";
+        findings.add(codes::RESPONSE_POOR, None, message, help);
     }
     let mut coherence: Vec<f64> = used.iter().map(|b| b.coherence).collect();
-    Some(ResponseReport {
-        record: signals.shown_as.clone(),
-        simulated: signals.simulated,
+    Some(FrequencyResponse {
         rate,
         segment,
         segments: averages,
@@ -202,7 +159,6 @@ fn responded(signals: &Signals, segment: Option<usize>, findings: &mut Findings)
         fitted,
         misfit_percent,
         bins,
-        warnings: Vec::new(),
     })
 }
 
@@ -214,8 +170,7 @@ fn automatic(samples: usize) -> usize {
 
 fn sampling_rate(signals: &Signals, findings: &mut Findings) -> Option<f64> {
     let time = signals.column(0);
-    let mut intervals: Vec<f64> = time.windows(2).map(|w| w[1] - w[0]).collect();
-    let interval = median(&mut intervals);
+    let interval = median_interval(time);
     // A time column with few digits rounds each time by up to half a digit; the grid as a whole must fit.
     let even = (time[time.len() - 1] - time[0]) / (time.len() - 1) as f64;
     let off = |k: usize| (time[k] - time[0] - k as f64 * even).abs();
@@ -226,13 +181,8 @@ fn sampling_rate(signals: &Signals, findings: &mut Findings) -> Option<f64> {
             time[worst],
             off(worst) / even
         );
-        findings.add(
-            codes::RESPONSE_SAMPLES,
-            Some(signals.lines.at(worst)),
-            message,
-            "record with a fixed sampling interval, without lost samples",
-        );
-        return None;
+        let help = "record with a fixed sampling interval, without lost samples";
+        return findings.refuse(codes::RESPONSE_SAMPLES, Some(signals.lines.at(worst)), message, help);
     }
     Some(1.0 / even)
 }
@@ -242,13 +192,7 @@ fn check_limits(signals: &Signals, findings: &mut Findings) {
     for (column, name) in [(1, "drive_V"), (2, "displacement_um")] {
         let values = signals.column(column);
         let (low, high) = extent(values);
-        if low >= high {
-            let message = format!(
-                "`{name}` is {low} in every sample, from {} to {}",
-                signals.place(0),
-                signals.place(values.len() - 1)
-            );
-            findings.add(codes::RECORD_CONSTANT, None, message, "is the channel connected?");
+        if signals.is_constant(column, name, "is the channel connected?", findings) {
             return;
         }
         for (limit, word) in [(low, "lower"), (high, "upper")] {
@@ -261,38 +205,23 @@ fn check_limits(signals: &Signals, findings: &mut Findings) {
                     "from {} on `{name}` is again and again exactly at its {word} limit {limit} ({stays} samples)",
                     signals.place(first)
                 );
-                findings.add(
-                    codes::RECORD_STUCK,
-                    Some(signals.lines.at(first)),
-                    message,
-                    "the gauge or its converter is at the end of its range: drive less, or shift the range",
-                );
+                let help = "the gauge or its converter is at the end of its range: drive less, or shift the range";
+                findings.add(codes::RECORD_STUCK, Some(signals.lines.at(first)), message, help);
                 return;
             }
         }
     }
-    let (drive, values) = (signals.column(1), signals.column(2));
-    let (low, high) = extent(drive);
-    let longest = (values.len() / 50).max(20);
-    let mut first = 0;
-    while first < values.len() {
-        let run = values[first..].iter().take_while(|v| **v == values[first]).count();
-        let (a, b) = extent(&drive[first..first + run]);
-        if run >= longest && b - a > 0.05 * (high - low) {
-            let message = format!(
-                "from {} to {} the displacement is stuck at {} um for {run} samples while the drive goes through {a} V to {b} V",
-                signals.place(first),
-                signals.place(first + run - 1),
-                values[first]
-            );
-            findings.add(
-                codes::RECORD_STUCK,
-                Some(signals.lines.at(first)),
-                message,
-                "check the connection of the gauge and record again",
-            );
-        }
-        first += run;
+    let values = signals.column(2);
+    for Standstill { first, run, input: [a, b] } in standstills(signals.column(1), values, (values.len() / 50).max(20))
+    {
+        let message = format!(
+            "from {} to {} the displacement is stuck at {} um for {run} samples while the drive goes through {a} V to {b} V",
+            signals.place(first),
+            signals.place(first + run - 1),
+            values[first]
+        );
+        let help = "check the connection of the gauge and record again";
+        findings.add(codes::RECORD_STUCK, Some(signals.lines.at(first)), message, help);
     }
 }
 
@@ -354,13 +283,8 @@ fn check_resonance(
             "the record does not show the resonance: the fit puts it at {f0:.1} Hz, coherent are {:.1} to {:.1} Hz{gap}",
             band[0], band[1]
         );
-        findings.add(
-            codes::RESPONSE_COHERENCE,
-            None,
-            message,
-            "excite the actuator through its resonance, and record long enough for coherence there",
-        );
-        return None;
+        let help = "excite the actuator through its resonance, and record long enough for coherence there";
+        return findings.refuse(codes::RESPONSE_COHERENCE, None, message, help);
     }
     Some(())
 }

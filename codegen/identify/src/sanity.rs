@@ -2,17 +2,15 @@
 
 use super::columns::LineNumbers;
 use super::findings::Findings;
+use super::least_squares::dot;
 use super::limits;
-use super::statistics::{extent, median, micrometres};
+use super::statistics::{Standstill, centred, extent, median, micrometres, standstills};
 use specgen_language::diagnostic::codes;
 
 /// Least number of samples of a record.
 pub const MIN_SAMPLES: usize = 100;
 /// A sampling interval this many times the median is a gap: a reversal may be hidden in it.
 const GAP: f64 = 10.0;
-/// Fraction of the drive's range over which the displacement may stay exactly equal; longer shows a stuck or limited
-/// sensor.
-const STUCK_TRAVEL: f64 = 0.05;
 /// A longer record of reversal curves, s, has another unit, or drifts.
 const LONGEST: f64 = 3600.0;
 /// White noise of a command, relative to its range, is below this (rounding to five digits); that of a gauge is above.
@@ -79,12 +77,8 @@ pub(crate) fn check_time(lines: &LineNumbers, time: &[f64], findings: &mut Findi
             w[1],
             GAP * (w[1] - w[0]) / gap
         );
-        findings.add(
-            codes::RECORD_GAP,
-            Some(lines.at(k + 1)),
-            message,
-            "record without gaps: a reversal of the drive may be missing",
-        );
+        let help = "record without gaps: a reversal of the drive may be missing";
+        findings.add(codes::RECORD_GAP, Some(lines.at(k + 1)), message, help);
     }
 }
 
@@ -96,50 +90,31 @@ fn check_not_constant(time: &[f64], column: &[f64], name: &str, unit: f64, findi
     }
     let shown = low * unit;
     let message = format!("`{name}` is {shown} in every sample, from {} s to {} s", time[0], time[time.len() - 1]);
-    findings.add(
-        codes::RECORD_CONSTANT,
-        None,
-        message,
-        "record while the drive runs through its range; is the channel connected?",
-    );
+    let help = "record while the drive runs through its range; is the channel connected?";
+    findings.add(codes::RECORD_CONSTANT, None, message, help);
     false
 }
 
 fn check_stuck(lines: &LineNumbers, time: &[f64], drive: &[f64], displacement: &[f64], findings: &mut Findings) {
-    let (low, high) = extent(drive);
     let (bottom, top) = extent(displacement);
     let swapped = look_swapped(drive, displacement);
-    let mut first = 0;
-    while first < drive.len() {
-        let value = displacement[first];
-        let run = displacement[first..].iter().take_while(|y| **y == value).count();
-        let (run_low, run_high) = extent(&drive[first..first + run]);
-        if run_high - run_low > STUCK_TRAVEL * (high - low) {
-            let um = micrometres(value);
-            if swapped {
-                let message = format!(
-                    "from {} s to {} s `displacement_um` stays at {um:.4} while `drive_V` goes through {run_low} to {run_high} with noise on it",
-                    time[first],
-                    time[first + run - 1]
-                );
-                let help = "the columns `drive_V` and `displacement_um` seem to be swapped";
-                findings.add(codes::COLUMNS_SWAPPED, Some(lines.at(first)), message, help);
-                return;
-            }
-            let what = if value == bottom || value == top { "is limited at" } else { "is stuck at" };
+    for Standstill { first, run, input: [low, high] } in standstills(drive, displacement, 1) {
+        let (value, from, to) = (displacement[first], time[first], time[first + run - 1]);
+        let um = micrometres(value);
+        if swapped {
             let message = format!(
-                "from {} s to {} s the displacement {what} {um} um for {run} samples while the drive goes through {run_low} V to {run_high} V",
-                time[first],
-                time[first + run - 1]
+                "from {from} s to {to} s `displacement_um` stays at {um:.4} while `drive_V` goes through {low} to {high} with noise on it"
             );
-            findings.add(
-                codes::RECORD_STUCK,
-                Some(lines.at(first)),
-                message,
-                "check the range and the connection of the displacement sensor",
-            );
+            let help = "the columns `drive_V` and `displacement_um` seem to be swapped";
+            findings.add(codes::COLUMNS_SWAPPED, Some(lines.at(first)), message, help);
+            return;
         }
-        first += run;
+        let what = if value == bottom || value == top { "is limited at" } else { "is stuck at" };
+        let message = format!(
+            "from {from} s to {to} s the displacement {what} {um} um for {run} samples while the drive goes through {low} V to {high} V"
+        );
+        let help = "check the range and the connection of the displacement sensor";
+        findings.add(codes::RECORD_STUCK, Some(lines.at(first)), message, help);
     }
 }
 
@@ -158,29 +133,13 @@ fn is_commanded(column: &[f64]) -> bool {
     median(&mut fourth) / (0.674_489_75 * 70f64.sqrt()) < COMMANDED_NOISE * (high - low)
 }
 
-/// Displacement must grow with the drive: a Preisach model with non-negative weights cannot do otherwise.
+/// Displacement must grow with the drive: a Preisach model with non-negative weights cannot do otherwise. The message
+/// names the part of the record that shows it best.
 fn check_sign(time: &[f64], drive: &[f64], displacement: &[f64], findings: &mut Findings) {
     let correlation = correlation(drive, displacement);
-    if correlation < 0.5 {
-        relation(time, drive, displacement, correlation, findings);
+    if correlation >= 0.5 || correlation.is_nan() {
+        return;
     }
-}
-
-fn correlation(drive: &[f64], displacement: &[f64]) -> f64 {
-    let count = drive.len() as f64;
-    let mean = |x: &[f64]| x.iter().fold(0.0, |sum, v| sum + v) / count;
-    let (mean_u, mean_y) = (mean(drive), mean(displacement));
-    let (mut uu, mut yy, mut uy) = (0.0, 0.0, 0.0);
-    for (u, y) in drive.iter().zip(displacement) {
-        uu += (u - mean_u) * (u - mean_u);
-        yy += (y - mean_y) * (y - mean_y);
-        uy += (u - mean_u) * (y - mean_y);
-    }
-    uy / (uu * yy).sqrt()
-}
-
-/// Reports a relation that no actuator has, with the part of the record that shows it best.
-fn relation(time: &[f64], drive: &[f64], displacement: &[f64], correlation: f64, findings: &mut Findings) {
     let at = |value: f64| drive.iter().position(|u| *u == value).unwrap_or(0);
     let (low, high) = extent(drive);
     let (a, b) = (at(low).min(at(high)), at(low).max(at(high)));
@@ -207,13 +166,14 @@ fn relation(time: &[f64], drive: &[f64], displacement: &[f64], correlation: f64,
         let message = format!(
             "the displacement hardly follows the drive (correlation {correlation:.2}; a piezo actuator shows more than 0.9): {shown}"
         );
-        findings.add(
-            codes::RECORD_RELATION,
-            None,
-            message,
-            "check that `drive_V` and `displacement_um` hold what their names say",
-        );
+        let help = "check that `drive_V` and `displacement_um` hold what their names say";
+        findings.add(codes::RECORD_RELATION, None, message, help);
     }
+}
+
+fn correlation(drive: &[f64], displacement: &[f64]) -> f64 {
+    let (u, y) = (centred(drive.to_vec()), centred(displacement.to_vec()));
+    dot(&u, &y) / (dot(&u, &u) * dot(&y, &y)).sqrt()
 }
 
 /// Whether the displacement falls with the drive on one part of its range and rises on the other.

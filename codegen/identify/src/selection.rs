@@ -7,7 +7,7 @@ use super::normal::{self, Normal, Weighting};
 use super::record::Record;
 use super::regressor::Plane;
 use super::report::Branches;
-use super::{statistics, trend};
+use super::statistics;
 use specgen_language::diagnostic::codes;
 
 /// Fraction of the drive range within which the drive counts as being at its minimum.
@@ -49,16 +49,11 @@ pub(crate) fn usable(record: &Record, plane: &Plane, findings: &mut Findings) ->
     let tolerance = AT_MINIMUM * (plane.range[1] - plane.range[0]);
     let Some(first) = branches::first_usable(record, tolerance) else {
         let message = "the drive never rises from its minimum".to_owned();
-        findings.add(
-            codes::TOO_FEW_CURVES,
-            None,
-            message,
-            &format!(
-                "start at the lowest drive, then rise to each reversal and fall back; {}",
-                coverage::such_a_drive(plane)
-            ),
+        let help = format!(
+            "start at the lowest drive, then rise to each reversal and fall back; {}",
+            coverage::such_a_drive(plane)
         );
-        return None;
+        return findings.refuse(codes::TOO_FEW_CURVES, None, message, &help);
     };
     let branches = branches::branches(&record.drive, first, REVERSAL * plane.interval());
     let curves = coverage::check_curves(&branches, plane, findings);
@@ -117,7 +112,7 @@ pub(crate) fn drift_of_returns(record: &Record, branches: &[Branch], plane: &Pla
         .filter(|b| b.rising && record.drive[b.first] <= minimum)
         .map(|b| (record.time[b.first], record.displacement[b.first]))
         .collect();
-    (trend::median_slope(&returns), returns.len())
+    (statistics::median_slope(&returns), returns.len())
 }
 
 /// Largest drive in V that counts as being at its minimum.

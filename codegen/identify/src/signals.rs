@@ -9,7 +9,8 @@ use super::columns::{self, Column, LineNumbers, RECORD, Samples};
 use super::file::open_file;
 use super::findings::Findings;
 use super::reading::Reading;
-use super::{sanity, statistics};
+use super::sanity;
+use super::statistics::{self, Standstill, standstills};
 use specgen_language::diagnostic::{Diagnostic, codes};
 
 /// A column that a record may have.
@@ -19,6 +20,14 @@ pub(crate) struct ColumnSpec {
     pub(crate) name: &'static str,
     /// Whether the record is refused without it.
     pub(crate) required: bool,
+}
+
+pub(crate) const fn required(name: &'static str) -> ColumnSpec {
+    ColumnSpec { name, required: true }
+}
+
+pub(crate) const fn optional(name: &'static str) -> ColumnSpec {
+    ColumnSpec { name, required: false }
 }
 
 /// Columns of equal length, in the requested order, in the units of their names.
@@ -42,31 +51,28 @@ pub(crate) const TIME: &str = "time_s";
 /// Least number of samples of a record.
 const MIN_SAMPLES: usize = 8;
 
+/// Where a record is read from.
+#[derive(Debug, Clone, Copy)]
+pub enum Input<'a> {
+    /// A file, and how to read it.
+    File(&'a Path, &'a Reading),
+    /// The text of a file with standard names.
+    Text(&'a str),
+}
+
 /// Reads the `wanted` columns. Time, if requested, is the first one; it must rise.
-pub(crate) fn read(
-    path: &Path,
-    shown_as: &str,
-    wanted: &[ColumnSpec],
-    reading: &Reading,
-) -> Result<Signals, Vec<Diagnostic>> {
+pub(crate) fn read(input: Input, shown_as: &str, wanted: &[ColumnSpec]) -> Result<Signals, Vec<Diagnostic>> {
     let mut findings = Findings::new(shown_as);
-    let signals = open_file(path, &mut findings).and_then(|file| checked(file, wanted, reading, &mut findings));
+    let signals = match input {
+        Input::File(path, reading) => {
+            open_file(path, &mut findings).and_then(|file| checked(file, wanted, reading, &mut findings))
+        }
+        Input::Text(text) => checked(text.as_bytes(), wanted, &Reading::default(), &mut findings),
+    };
     findings.conclude(signals).map(|(signals, _)| signals)
 }
 
-/// The same from the text of a file.
-pub(crate) fn parse(text: &str, shown_as: &str, wanted: &[ColumnSpec]) -> Result<Signals, Vec<Diagnostic>> {
-    let mut findings = Findings::new(shown_as);
-    let signals = checked(text.as_bytes(), wanted, &Reading::default(), &mut findings);
-    findings.conclude(signals).map(|(signals, _)| signals)
-}
-
-pub(crate) fn checked(
-    source: impl Read,
-    wanted: &[ColumnSpec],
-    reading: &Reading,
-    findings: &mut Findings,
-) -> Option<Signals> {
+fn checked(source: impl Read, wanted: &[ColumnSpec], reading: &Reading, findings: &mut Findings) -> Option<Signals> {
     let signals = columns_of(source, wanted, reading, findings)?;
     let lines = &signals.lines;
     if lines.len() < MIN_SAMPLES {
@@ -117,50 +123,38 @@ impl Signals {
         }
     }
 
+    /// Refuses a column that never changes; returns whether it does not.
+    pub(crate) fn is_constant(&self, column: usize, name: &str, help: &str, findings: &mut Findings) -> bool {
+        let (low, high) = statistics::extent(self.column(column));
+        if low >= high {
+            let (from, to) = (self.place(0), self.place(self.lines.len() - 1));
+            let message = format!("`{name}` is {low} in every sample, from {from} to {to}");
+            findings.add(codes::RECORD_CONSTANT, None, message, help);
+        }
+        low >= high
+    }
+
     /// Refuses a column that never changes, or that is exactly constant while `input` travels 5 % of its range.
     pub(crate) fn check_moves(&self, input: usize, output: usize, names: [&str; 2], findings: &mut Findings) {
-        for (which, name) in [input, output].into_iter().zip(names) {
-            let (low, high) = statistics::extent(self.column(which));
-            if low >= high {
-                let message = format!(
-                    "`{name}` is {low} in every sample, from {} to {}",
-                    self.place(0),
-                    self.place(self.lines.len() - 1)
-                );
-                findings.add(
-                    codes::RECORD_CONSTANT,
-                    None,
-                    message,
-                    "record while it runs through its range; is the channel connected?",
-                );
-                return;
-            }
+        let help = "record while it runs through its range; is the channel connected?";
+        let mut channels = [input, output].into_iter().zip(names);
+        if channels.any(|(which, name)| self.is_constant(which, name, help, findings)) {
+            return;
         }
-        let (x, y) = (self.column(input), self.column(output));
-        let (low, high) = statistics::extent(x);
+        let y = self.column(output);
         let (bottom, top) = statistics::extent(y);
-        let mut first = 0;
-        while first < y.len() {
-            let run = y[first..].iter().take_while(|v| **v == y[first]).count();
-            let (a, b) = statistics::extent(&x[first..first + run]);
-            if run > 2 && b - a > 0.05 * (high - low) {
-                let what = if y[first] == bottom || y[first] == top { "is limited at" } else { "is stuck at" };
-                let message = format!(
-                    "from {} to {} `{}` {what} {} for {run} samples while `{}` goes through {a} to {b}",
-                    self.place(first),
-                    self.place(first + run - 1),
-                    names[1],
-                    y[first],
-                    names[0]
-                );
-                findings.add(
-                    codes::RECORD_STUCK,
-                    Some(self.lines.at(first)),
-                    message,
-                    "check the range and the connection of that channel; record again within its range",
-                );
-            }
-            first += run;
+        for Standstill { first, run, input: [a, b] } in standstills(self.column(input), y, 3) {
+            let what = if y[first] == bottom || y[first] == top { "is limited at" } else { "is stuck at" };
+            let message = format!(
+                "from {} to {} `{}` {what} {} for {run} samples while `{}` goes through {a} to {b}",
+                self.place(first),
+                self.place(first + run - 1),
+                names[1],
+                y[first],
+                names[0]
+            );
+            let help = "check the range and the connection of that channel; record again within its range";
+            findings.add(codes::RECORD_STUCK, Some(self.lines.at(first)), message, help);
         }
     }
 }

@@ -33,8 +33,7 @@ pub fn parse(text: &str, shown_as: &str) -> Result<Vec<State>, Vec<Diagnostic>> 
             };
             return Some((0..count).map(state).collect());
         };
-        findings.add(codes::RECORD_HEADER, Some(header.line), wrong, HELP);
-        None
+        findings.refuse(codes::RECORD_HEADER, Some(header.line), wrong, HELP)
     });
     findings.conclude(states).map(|(states, _)| states)
 }

@@ -5,23 +5,18 @@
 //! its creep. A force is positive if it pushes the displacement up: k is positive then.
 
 use serde::Serialize;
-use std::path::Path;
 
 use super::cause::lagging;
+use super::estimate::{self, Estimate};
 use super::findings::Findings;
 use super::least_squares::{Fit, fit, independent_samples, mean_square};
-use super::reading::Reading;
-use super::signals::{self, ColumnSpec, Signals};
+use super::signals::{ColumnSpec, Input, Signals, optional, required};
 use super::statistics::extent;
 use specgen_language::diagnostic::{Diagnostic, codes};
 
 /// A stiffness and its quality.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct StiffnessReport {
-    /// Name of the record.
-    pub record: String,
-    /// Whether a comment in it marks it as simulated.
-    pub simulated: bool,
+pub struct AxialStiffness {
     /// Samples of the record.
     pub samples: usize,
     /// Stiffness k, N/m: force over displacement without creep.
@@ -48,17 +43,10 @@ pub struct StiffnessReport {
     /// Time of each of the `points`, s.
     #[serde(skip)]
     pub time: Vec<f64>,
-    /// Findings that refuse nothing.
-    #[serde(skip)]
-    pub warnings: Vec<Diagnostic>,
 }
 
-const COLUMNS: [ColumnSpec; 4] = [
-    ColumnSpec { name: "time_s", required: true },
-    ColumnSpec { name: "force_N", required: true },
-    ColumnSpec { name: "displacement_um", required: true },
-    ColumnSpec { name: "drive_V", required: false },
-];
+const COLUMNS: [ColumnSpec; 4] =
+    [required("time_s"), required("force_N"), required("displacement_um"), optional("drive_V")];
 /// Creep time constants tried per decade from ten samples to the record's length.
 const PER_DECADE: usize = 6;
 /// Halvings of the step in ln τ around the best of them.
@@ -85,40 +73,24 @@ struct Creep {
 /// # Errors
 /// E0644 if displacement falls with force, E0645 if the drive moves, E0646 if the force does not move the actuator or the
 /// unit is wrong, and those of reading.
-pub fn measure(path: &Path, shown_as: &str, reading: &Reading) -> Result<StiffnessReport, Vec<Diagnostic>> {
-    of_signals(&signals::read(path, shown_as, &COLUMNS, reading)?)
+pub fn measure(input: Input, shown_as: &str) -> Result<Estimate<AxialStiffness>, Vec<Diagnostic>> {
+    estimate::of(input, shown_as, &COLUMNS, measure_checked)
 }
 
-/// The same from the text of a record.
-///
-/// # Errors
-/// As [`measure`].
-pub fn measure_text(text: &str, shown_as: &str) -> Result<StiffnessReport, Vec<Diagnostic>> {
-    of_signals(&signals::parse(text, shown_as, &COLUMNS)?)
-}
-
-fn of_signals(signals: &Signals) -> Result<StiffnessReport, Vec<Diagnostic>> {
-    let mut findings = Findings::new(&signals.shown_as);
-    let report = measured(signals, &mut findings);
-    let (mut report, warnings) = findings.conclude(report)?;
-    report.warnings = warnings;
-    Ok(report)
-}
-
-fn measured(signals: &Signals, findings: &mut Findings) -> Option<StiffnessReport> {
+fn measure_checked(signals: &Signals, findings: &mut Findings) -> Option<AxialStiffness> {
     let (time, force) = (signals.column(0), signals.column(1));
     if time.len() < 30 {
-        findings.add(
+        let message = format!(
+            "has {} samples and ends at {} s; at least 30 are needed",
+            time.len(),
+            signals.place(time.len() - 1)
+        );
+        return findings.refuse(
             codes::RECORD_TOO_SHORT,
             None,
-            format!(
-                "has {} samples and ends at {} s; at least 30 are needed",
-                time.len(),
-                signals.place(time.len() - 1)
-            ),
+            message,
             "record at least one rise and fall of the force",
         );
-        return None;
     }
     signals.check_moves(1, 2, ["force_N", "displacement_um"], findings);
     check_drive(signals, findings);
@@ -137,8 +109,7 @@ fn measured(signals: &Signals, findings: &mut Findings) -> Option<StiffnessRepor
             signals.place(0),
             signals.place(time.len() - 1)
         );
-        findings.add(codes::STIFFNESS_RECORD, None, message, "raise and lower the force at least once");
-        return None;
+        return findings.refuse(codes::STIFFNESS_RECORD, None, message, "raise and lower the force at least once");
     };
     let base = mean_square(&straight.residual);
     let mut best: Option<Creep> = None;
@@ -194,12 +165,8 @@ fn measured(signals: &Signals, findings: &mut Findings) -> Option<StiffnessRepor
             "a stiffness of {stiffness:.3e} N/m is none of a piezo actuator (force {low} to {high} N, highest at {})",
             signals.place(at)
         );
-        findings.add(
-            codes::STIFFNESS_RECORD,
-            None,
-            message,
-            "write the force in newtons and the displacement in micrometres; are the columns swapped?",
-        );
+        let help = "write the force in newtons and the displacement in micrometres; are the columns swapped?";
+        findings.add(codes::STIFFNESS_RECORD, None, message, help);
     }
     let error = compliance_error * stiffness * stiffness;
     if error > 0.01 * UNCERTAIN * stiffness {
@@ -215,9 +182,7 @@ fn measured(signals: &Signals, findings: &mut Findings) -> Option<StiffnessRepor
         })
         .collect();
     let (low, high) = extent(force);
-    Some(StiffnessReport {
-        record: signals.shown_as.clone(),
-        simulated: signals.simulated,
+    Some(AxialStiffness {
         samples: y.len(),
         stiffness,
         error,
@@ -230,7 +195,6 @@ fn measured(signals: &Signals, findings: &mut Findings) -> Option<StiffnessRepor
         independent,
         points,
         time: time.to_vec(),
-        warnings: Vec::new(),
     })
 }
 
@@ -239,12 +203,8 @@ fn check_drive(signals: &Signals, findings: &mut Findings) {
     let start = drive[0];
     if let Some(k) = drive.iter().position(|u| (u - start).abs() > CONSTANT) {
         let message = format!("at {} the drive is {} V, while it began with {start} V", signals.place(k), drive[k]);
-        findings.add(
-            codes::STIFFNESS_DRIVE,
-            Some(signals.lines.at(k)),
-            message,
-            "hold the drive constant while the force changes",
-        );
+        let help = "hold the drive constant while the force changes";
+        findings.add(codes::STIFFNESS_DRIVE, Some(signals.lines.at(k)), message, help);
     }
 }
 
@@ -254,8 +214,7 @@ fn check_sign(signals: &Signals, force: &[f64], compliance: f64, error: f64, fin
     if compliance.abs() <= 2.0 * error {
         let message =
             format!("the displacement does not follow the force (lowest at {}, highest at {})", at(low), at(high));
-        findings.add(codes::STIFFNESS_RECORD, None, message, "use more force, or a gauge of less noise");
-        return None;
+        return findings.refuse(codes::STIFFNESS_RECORD, None, message, "use more force, or a gauge of less noise");
     }
     if compliance < 0.0 {
         let message = format!(
@@ -264,13 +223,8 @@ fn check_sign(signals: &Signals, force: &[f64], compliance: f64, error: f64, fin
             at(high),
             1.0 / compliance
         );
-        findings.add(
-            codes::STIFFNESS_SIGN,
-            None,
-            message,
-            "count force positive where it pushes the displacement up: change the sign of one column",
-        );
-        return None;
+        let help = "count force positive where it pushes the displacement up: change the sign of one column";
+        return findings.refuse(codes::STIFFNESS_SIGN, None, message, help);
     }
     Some(())
 }

@@ -6,7 +6,7 @@
 
 use std::path::Path;
 
-use crate::columns::{self, Format, Header, Samples};
+use crate::columns::{self, Format, Head, Samples};
 use crate::findings::Findings;
 use specgen_language::diagnostic::{Diagnostic, codes};
 
@@ -47,24 +47,17 @@ pub fn read(path: &Path, shown_as: &str, period: f64) -> Result<(Waveform, Strin
 /// All findings of the file.
 pub fn parse(text: &str, shown_as: &str, period: f64) -> Result<Waveform, Vec<Diagnostic>> {
     let mut findings = Findings::new(shown_as);
-    match parse_rows(text, shown_as, period, &mut findings) {
-        Some(waveform) if !findings.any_error() => Ok(waveform),
-        _ => Err(findings.into_diagnostics()),
-    }
+    let waveform = parse_rows(text, shown_as, period, &mut findings);
+    findings.conclude(waveform).map(|(waveform, _)| waveform)
 }
 
-/// Content of a column, and its unit.
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum Column {
-    Time(f64),
-    Axis(usize, f64),
-}
+/// Axis of a column, none for the time, and its unit in SI units.
+type Meaning = (Option<usize>, f64);
 
 fn parse_rows(text: &str, shown_as: &str, period: f64, findings: &mut Findings) -> Option<Waveform> {
     let (header, lines) = columns::open(text.as_bytes(), &FORMAT, findings)?;
     if header.names.iter().all(String::is_empty) {
-        findings.add(codes::WAVEFORM_HEADER, None, "is empty".to_owned(), EXPECTED);
-        return None;
+        return findings.refuse(codes::WAVEFORM_HEADER, None, "is empty".to_owned(), EXPECTED);
     }
     let columns = meanings(&header, findings)?;
     let all: Vec<columns::Column> =
@@ -74,11 +67,11 @@ fn parse_rows(text: &str, shown_as: &str, period: f64, findings: &mut Findings) 
     let mut rows = vec![[0.0; 6]; lines.len()];
     for (column, values) in columns.iter().zip(&values) {
         match *column {
-            Column::Time(unit) => {
+            (None, unit) => {
                 let times = lines.iter().zip(values).filter(|(_, time)| time.is_finite());
                 check_times(&times.map(|(line, time)| (*line, time * unit)).collect::<Vec<_>>(), period, findings);
             }
-            Column::Axis(axis, unit) => {
+            (Some(axis), unit) => {
                 rows.iter_mut().zip(values).for_each(|(row, value)| row[axis] = value * unit);
             }
         }
@@ -102,23 +95,18 @@ const FORMAT: Format = Format {
 const EXPECTED: &str = "name the columns by axis and unit in the first line, such as `x_um,y_um,z_um,theta_x_urad`";
 
 /// Content of each column, or `None` after every problem of the header was reported.
-fn meanings(header: &Header, findings: &mut Findings) -> Option<Vec<Column>> {
+fn meanings(header: &Head, findings: &mut Findings) -> Option<Vec<Meaning>> {
     let line = Some(header.line);
-    let mut found: Vec<Column> = Vec::new();
+    let mut found: Vec<Meaning> = Vec::new();
     for (place, name) in header.names.iter().enumerate() {
-        match column(name) {
-            Ok(column) => {
-                let same = |other: &Column| match (other, &column) {
-                    (Column::Time(_), Column::Time(_)) => true,
-                    (Column::Axis(a, _), Column::Axis(b, _)) => a == b,
-                    _ => false,
-                };
-                if let Some(first) = found.iter().position(same) {
+        match meaning(name) {
+            Ok(meaning) => {
+                if let Some(first) = found.iter().position(|(axis, _)| *axis == meaning.0) {
                     let message =
                         format!("columns {} and {} (`{name}`) hold the same coordinate", first + 1, place + 1);
                     findings.add(codes::WAVEFORM_HEADER, line, message, "keep one of them");
                 }
-                found.push(column);
+                found.push(meaning);
             }
             Err(help) => {
                 let message = format!("`{name}` is not a column of a table of poses");
@@ -129,15 +117,14 @@ fn meanings(header: &Header, findings: &mut Findings) -> Option<Vec<Column>> {
     if findings.any_error() {
         return None;
     }
-    if found.iter().all(|column| matches!(column, Column::Time(_))) {
-        findings.add(codes::WAVEFORM_HEADER, line, "has no coordinate".to_owned(), EXPECTED);
-        return None;
+    if found.iter().all(|(axis, _)| axis.is_none()) {
+        return findings.refuse(codes::WAVEFORM_HEADER, line, "has no coordinate".to_owned(), EXPECTED);
     }
     Some(found)
 }
 
-/// The column of a name, or how to fix the name.
-fn column(name: &str) -> Result<Column, String> {
+/// The meaning of a name, or how to fix the name.
+fn meaning(name: &str) -> Result<Meaning, String> {
     let lower = name.to_ascii_lowercase();
     let (quantity, unit) = lower.rsplit_once('_').unwrap_or((lower.as_str(), ""));
     let size = |units: &[(&str, f64)]| units.iter().find(|(name, _)| *name == unit).map(|(_, size)| *size);
@@ -150,11 +137,11 @@ fn column(name: &str) -> Result<Column, String> {
         return Err(format!("the unit is part of the name: `{name}_{}`", if axis < 3 { "um" } else { "urad" }));
     }
     if quantity == "time" || quantity == "t" {
-        return size(&TIMES).map(Column::Time).ok_or_else(|| names(&TIMES));
+        return size(&TIMES).map(|unit| (None, unit)).ok_or_else(|| names(&TIMES));
     }
     if let Some(axis) = AXES.iter().position(|axis| *axis == quantity) {
         let units = if axis < 3 { &LENGTHS } else { &ANGLES };
-        return size(units).map(|unit| Column::Axis(axis, unit)).ok_or_else(|| names(units));
+        return size(units).map(|unit| (Some(axis), unit)).ok_or_else(|| names(units));
     }
     Err(EXPECTED.to_owned())
 }
@@ -199,7 +186,7 @@ mod tests {
         assert!(refused("x_um,theta_x_deg\n")[0].contains("`theta_x_rad`"));
         assert!(refused("x_um,z_V\n")[0].contains("`z_um`"));
         assert!(refused("theta_x\n")[0].contains("`theta_x_urad`"));
-        assert!(refused("pitch\n")[0].contains("not a column of a table"));
+        assert!(refused("pitch\n")[0].contains("is not a column of a table"));
         assert!(refused("1.0,2.0\n1,2\n")[0].contains("first line"));
         assert!(refused("time_s\n1\n2\n")[0].contains("no coordinate"));
     }

@@ -2,12 +2,12 @@
 
 use crate::chart::{Axis, Chart, Mark, Patch};
 use crate::plot::{BLUE, GREY, ORANGE, PURPLE, figure};
-use specgen_identify::gauge::GaugeReport;
+use specgen_identify::gauge::GaugeCalibration;
 use specgen_identify::linear::LinearReport;
 use specgen_identify::rate::RateReport;
-use specgen_identify::response::ResponseReport;
-use specgen_identify::stiffness::StiffnessReport;
-use specgen_identify::{GridChoice, Identification, Prediction, Record, Trace};
+use specgen_identify::response::FrequencyResponse;
+use specgen_identify::stiffness::AxialStiffness;
+use specgen_identify::{Estimate, GridChoice, Identification, Prediction, Record, Trace};
 
 fn panel(title: &str, x: Axis, y: Axis) -> Chart {
     Chart::new("", title, x, y)
@@ -230,7 +230,7 @@ pub fn linear(report: &LinearReport, records: &[Record]) -> String {
 
 /// Magnitude, phase and coherence, with the fitted model.
 #[must_use]
-pub fn response(report: &ResponseReport) -> String {
+pub fn response(Estimate { record, value: report, .. }: &Estimate<FrequencyResponse>) -> String {
     let shown: Vec<_> = report
         .bins
         .iter()
@@ -294,17 +294,12 @@ pub fn response(report: &ResponseReport) -> String {
         report.segments,
         report.segment
     );
-    figure(
-        &format!("Frequency response of {}", shortened(&report.record)),
-        &subtitle,
-        &[magnitude, phase, coherence],
-        2,
-    )
+    figure(&format!("Frequency response of {}", shortened(record)), &subtitle, &[magnitude, phase, coherence], 2)
 }
 
 /// Calibration and its residual.
 #[must_use]
-pub fn gauge(report: &GaugeReport) -> String {
+pub fn gauge(Estimate { record, value: report, .. }: &Estimate<GaugeCalibration>) -> String {
     let value = |v: f64| report.coefficients.iter().rev().fold(0.0, |sum, c| sum * v + c);
     let [low, high] = report.volts;
     let line = (0..=200).map(|k| low + (high - low) * f64::from(k) / 200.0).map(|v| [v, value(v) * 1e6]).collect();
@@ -329,12 +324,12 @@ pub fn gauge(report: &GaugeReport) -> String {
         report.hysteresis.map_or_else(|| "unknown (no reversal)".to_owned(), |h| format!("{:.2} nm", h * 1e9)),
         report.least_slope_percent
     );
-    figure(&format!("Gauge calibration of {}", shortened(&report.record)), &subtitle, &[calibration, rest, degrees], 2)
+    figure(&format!("Gauge calibration of {}", shortened(record)), &subtitle, &[calibration, rest, degrees], 2)
 }
 
 /// Force over displacement without creep, and the residual.
 #[must_use]
-pub fn stiffness(report: &StiffnessReport) -> String {
+pub fn stiffness(Estimate { record, value: report, .. }: &Estimate<AxialStiffness>) -> String {
     let measured = report.points.iter().map(|p| [p[0], p[1] * 1e9]).collect();
     let [low, high] = report.force;
     let line = vec![[low, low / report.stiffness * 1e9], [high, high / report.stiffness * 1e9]];
@@ -358,5 +353,5 @@ pub fn stiffness(report: &StiffnessReport) -> String {
             |t| format!("creep {:.1} % with {t:.3} s removed", report.creep_percent)
         )
     );
-    figure(&format!("Stiffness from {}", shortened(&report.record)), &subtitle, &[law, rest], 2)
+    figure(&format!("Stiffness from {}", shortened(record)), &subtitle, &[law, rest], 2)
 }

@@ -1,14 +1,12 @@
 //! Identification commands: measured records in; tables, spec lines, figures and pictures out.
 
 mod cause;
+pub mod estimates;
 pub mod everett;
 pub mod gains;
-pub mod gauge;
 pub mod linear;
 pub mod predict;
 pub mod rate;
-pub mod response;
-pub mod stiffness;
 
 use serde::Serialize;
 use specgen_identify::Reading;
@@ -29,9 +27,6 @@ pub struct Bench {
 /// An identification result with its report.
 #[derive(Serialize)]
 struct IdentificationResult<R> {
-    /// Name as given.
-    #[serde(skip)]
-    record: String,
     report: R,
     /// Spec keys whose values are now measured; empty if the record is simulated.
     measured: MeasuredKeys,

@@ -7,7 +7,7 @@ use std::path::PathBuf;
 
 use specgen::diagnostic::{Diagnostic, Place, Severity, render, to_json};
 use specgen::findings;
-use specgen::identify::{gauge, parse_record, read_table_csv, response, stiffness, write_table_csv};
+use specgen::identify::{Input, gauge, parse_record, read_table_csv, response, stiffness, write_table_csv};
 use specgen::operate::{Command, read_wave};
 use specgen::spec::{self, SpecSource};
 use specgen::{lint, waveform};
@@ -75,9 +75,9 @@ fn csv(input: &[u8]) {
         let again = accepted(read_table_csv(&write_table_csv(&table), FILE));
         assert_eq!(again.map(|again| again.grid), Some(table.grid));
     }
-    let _ = accepted(gauge::calibrate_text(&text, FILE, None));
-    let _ = accepted(stiffness::measure_text(&text, FILE));
-    let _ = accepted(response::respond_text(&text, FILE, None));
+    let _ = accepted(gauge::calibrate(Input::Text(&text), FILE, None));
+    let _ = accepted(stiffness::measure(Input::Text(&text), FILE));
+    let _ = accepted(response::respond(Input::Text(&text), FILE, None));
 }
 
 /// Name of a file of numbers.

@@ -8,7 +8,7 @@ use specgen_identify::Reading;
 use specgen_identify::mode::Mode;
 use specgen_language::outcome::Failure;
 use specgen_language::ui::Ui;
-use specgen_report::identify::{Bench, everett, gains, gauge, linear, predict, rate, response, stiffness};
+use specgen_report::identify::{Bench, estimates, everett, gains, linear, predict, rate};
 
 use super::named::{InputFile, OutputFile, OutputFolder};
 use super::number::number;
@@ -263,15 +263,17 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
             linear::run(records, frequency, *reference, spec.as_deref(), &bench.bench()?, ui)
         }
         Some(Kind::Response(ResponseArguments { record, segment, bench })) => {
-            response::run(record, *segment, &bench.bench()?, ui)
+            estimates::response(record, *segment, &bench.bench()?, ui)
         }
         Some(Kind::Gains(GainsArguments { recording, spec, output })) => {
             gains::run(recording, spec, output.as_deref(), ui)
         }
         Some(Kind::Gauge(GaugeArguments { record, degree, table, bench })) => {
-            gauge::run(record, *degree, table.as_deref(), &bench.bench()?, ui)
+            estimates::gauge(record, *degree, table.as_deref(), &bench.bench()?, ui)
         }
-        Some(Kind::Stiffness(StiffnessArguments { record, bench })) => stiffness::run(record, &bench.bench()?, ui),
+        Some(Kind::Stiffness(StiffnessArguments { record, bench })) => {
+            estimates::stiffness(record, &bench.bench()?, ui)
+        }
         Some(Kind::Predict(one)) => {
             let options = predict::Options {
                 model: one.model.to_path_buf(),

@@ -1,6 +1,7 @@
 //! Hum of the mains in a residual.
 
 use crate::least_squares::{fit, mean_square};
+use crate::statistics::centred;
 
 /// Frequencies of mains and their first harmonics, Hz.
 const MAINS: [f64; 6] = [50.0, 60.0, 100.0, 120.0, 150.0, 180.0];
@@ -20,7 +21,7 @@ pub(super) fn take(time: &[f64], drive: &[f64], left: &[f64], highest: f64) -> O
     let duration = time.last()? - time.first()?;
     let step = time.len().div_ceil(SAMPLES);
     let thin = |values: &[f64]| -> Vec<f64> { values.iter().step_by(step).copied().collect() };
-    let (t, few, u) = (thin(time), thin(left), centred(&thin(drive)));
+    let (t, few, u) = (thin(time), thin(left), centred(thin(drive)));
     let explained =
         |frequency: f64, values: &[f64]| Some(1.0 - mean_square(&wave(frequency, &t, values)?) / mean_square(values));
     // A record resolves a frequency by the inverse of its duration.
@@ -60,9 +61,4 @@ fn wave(frequency: f64, time: &[f64], values: &[f64]) -> Option<Vec<f64>> {
     let sine: Vec<f64> = time.iter().map(|t| libm::sin(angle(t))).collect();
     let cosine: Vec<f64> = time.iter().map(|t| libm::cos(angle(t))).collect();
     fit(&[&sine, &cosine], values).map(|found| found.residual)
-}
-
-fn centred(values: &[f64]) -> Vec<f64> {
-    let mean = values.iter().fold(0.0, |sum, v| sum + v) / values.len().max(1) as f64;
-    values.iter().map(|v| v - mean).collect()
 }

@@ -1,8 +1,8 @@
 //! Resonance in a residual: the response of a mode to the drive, beyond a wrong gain, searched over its frequency.
 
-use super::{centred, rates};
 use crate::least_squares::{fit, mean_square};
 use crate::mode::Mode;
+use crate::statistics::{centred, rates};
 
 /// Frequencies tried for a resonance, from [`SLOWEST`] over the duration to [`FASTEST`] over the sampling interval, and its damping.
 const MODES: usize = 48;

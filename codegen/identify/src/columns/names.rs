@@ -19,7 +19,7 @@ const LENGTH: &[Unit] = &[("um", 1.0), ("nm", 1e3), ("pm", 1e6), ("mm", 1e-3), (
 const FORCE: &[Unit] = &[("N", 1.0), ("mN", 1e3), ("kN", 1e-3)];
 
 /// Every quantity of a record.
-const QUANTITIES: [Quantity; 7] = [
+pub(crate) static QUANTITIES: [Quantity; 7] = [
     Quantity { name: "time_s", also: &["t", "zeit"], units: TIME },
     Quantity { name: "drive_V", also: &["command"], units: VOLTAGE },
     Quantity { name: "monitor_V", also: &[], units: VOLTAGE },
@@ -37,11 +37,6 @@ const X_VALUE: &str = "xvalue";
 /// The quantity of a column such as `time_s`.
 pub(crate) fn quantity(name: &str) -> Option<&'static Quantity> {
     QUANTITIES.iter().find(|quantity| quantity.name == name)
-}
-
-/// Every quantity.
-pub(crate) fn all() -> impl Iterator<Item = &'static Quantity> {
-    QUANTITIES.iter()
 }
 
 /// Quality of a match between header and quantity, the best first.

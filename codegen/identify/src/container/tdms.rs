@@ -40,14 +40,8 @@ fn width(kind: u32) -> Result<usize, String> {
 /// Format for [`Bytes::numbers`]; none for texts, flags and times.
 fn form(kind: u32) -> Option<(char, usize)> {
     Some(match kind {
-        1 => ('i', 1),
-        2 => ('i', 2),
-        3 => ('i', 4),
-        4 => ('i', 8),
-        5 => ('u', 1),
-        6 => ('u', 2),
-        7 => ('u', 4),
-        8 => ('u', 8),
+        1..=4 => ('i', 1 << (kind - 1)),
+        5..=8 => ('u', 1 << (kind - 5)),
         9 | 0x19 => ('f', 4),
         10 | 0x1a => ('f', 8),
         _ => return None,

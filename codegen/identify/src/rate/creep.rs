@@ -13,7 +13,8 @@ use super::forward::{kept, parts};
 use super::prepare::PreparedRecord;
 use super::table::Tables;
 use super::{CreepTerm, RateModel, mixed};
-use crate::trend::Line;
+use crate::least_squares::dot;
+use crate::statistics::{Line, rates};
 use specgen_numerics::nnls::Failure;
 
 /// Fewest and most creep operators; between them, one a decade of the time constants.
@@ -99,25 +100,24 @@ fn linear_part(records: &[&PreparedRecord], signals: &[Vec<Vec<f64>>], dead_time
         let time = &p.record.time[p.first..];
         let mut columns: Vec<Vec<f64>> = signals[1..].to_vec();
         columns.push(signals[0].clone());
-        columns.push(derivative(time, &signals[0]));
-        columns.iter_mut().for_each(|column| detrend(time, column));
+        columns.push(rates(time, &signals[0], &vec![true; time.len()]));
+        columns.iter_mut().for_each(|column| *column = Line::fit(time, column).removed(time, column));
         let share = 1.0 / p.samples() as f64;
         if pass < records.len() {
             // First pass: the size of each column, to scale the small matrix.
             for (scale, column) in scale_of.iter_mut().zip(&columns) {
-                *scale += share * column.iter().fold(0.0, |sum, x| sum + x * x);
+                *scale += share * dot(column, column);
             }
             continue;
         }
-        let mut y = p.delayed(dead_time);
-        detrend(time, &mut y);
-        energy += share * y.iter().fold(0.0, |sum, y| sum + y * y);
+        let y = p.delayed(dead_time);
+        let y = Line::fit(time, &y).removed(time, &y);
+        energy += share * dot(&y, &y);
         for (a, column) in columns.iter().enumerate() {
             let size = share / scale_of[a].sqrt();
-            rhs[a] += size * column.iter().zip(&y).fold(0.0, |sum, (x, y)| sum + x * y);
+            rhs[a] += size * dot(column, &y);
             for (b, other) in columns.iter().enumerate() {
-                let product = column.iter().zip(other).fold(0.0, |sum, (x, y)| sum + x * y);
-                gram[(a, b)] += size * product / scale_of[b].sqrt();
+                gram[(a, b)] += size * dot(column, other) / scale_of[b].sqrt();
             }
         }
     }
@@ -127,7 +127,7 @@ fn linear_part(records: &[&PreparedRecord], signals: &[Vec<Vec<f64>>], dead_time
     let target_size = energy.sqrt();
     let scaled: Vec<f64> = rhs.iter().map(|b| b / target_size).collect();
     let solution = mixed::solve(&gram, &scaled, terms)?;
-    let explained = solution.iter().zip(&scaled).fold(0.0, |sum, (w, b)| sum + w * b);
+    let explained = dot(&solution, &scaled);
     let value = |k: usize| solution[k] * target_size / scale_of[k].sqrt();
     Ok(Linear {
         scale: value(terms),
@@ -135,20 +135,4 @@ fn linear_part(records: &[&PreparedRecord], signals: &[Vec<Vec<f64>>], dead_time
         later: -value(terms + 1),
         residual: energy * (1.0 - explained),
     })
-}
-
-fn detrend(time: &[f64], values: &mut [f64]) {
-    let line = Line::fit(time, values);
-    values.iter_mut().zip(time).for_each(|(y, t)| *y -= line.at(*t));
-}
-
-/// Central difference, one-sided at the ends.
-fn derivative(time: &[f64], f: &[f64]) -> Vec<f64> {
-    let last = f.len().saturating_sub(1);
-    (0..f.len())
-        .map(|k| {
-            let (a, b) = (k.saturating_sub(1), if k < last { k + 1 } else { last });
-            (f[b] - f[a]) / (time[b] - time[a])
-        })
-        .collect()
 }

@@ -1,15 +1,14 @@
 //! Fits of the options to several records at once.
 
 use super::joint::Shape;
-use super::normal::accumulate;
 use super::prepare::PreparedRecord;
-use super::table::Tables;
+use super::table::{Tables, accumulate};
 use super::{RateModel, creep, joint, mixed, table};
 use crate::findings::Findings;
+use crate::least_squares::dot;
 use crate::mode::Mode;
 use crate::regressor::Plane;
 use crate::{dead_time, normal, prior};
-use specgen_language::diagnostic::codes;
 use specgen_numerics::nnls::Failure;
 
 /// Smoothness of μ₁ relative to that of μ₀ ([`prior`]): μ₁ is a small difference between rates, with as many unknowns.
@@ -37,12 +36,7 @@ pub(super) fn all(
         let moved = mode.map(|mode| shaped(true, Some(mode))).transpose()?;
         Ok([still, late, dynamic, creep, even].into_iter().chain(moved).collect())
     };
-    fitted()
-        .map_err(|failure| {
-            let message = format!("the weights cannot be determined ({failure:?})");
-            findings.add(codes::NOT_DETERMINED, None, message, "choose a smaller grid, or record more reversal curves");
-        })
-        .ok()
+    fitted().map_err(|failure| normal::report_undetermined(&failure, findings)).ok()
 }
 
 /// One table for all records with `dead_time` (s).
@@ -92,7 +86,7 @@ fn dynamic(plane: &Plane, records: &[&PreparedRecord], dead_times: [f64; 2]) -> 
         let rhs: Vec<f64> = normal.rhs[k].iter().map(|b| b * scale).collect();
         let weights = mixed::solve(&normal.gram, &rhs, nodes)?;
         // The explained part, by the normal equations: wᵀGw = wᵀb, except for weights at their bound, which are zero.
-        let explained = weights.iter().zip(&rhs).fold(0.0, |sum, (w, b)| sum + w * b) / (scale * scale);
+        let explained = dot(&weights, &rhs) / (scale * scale);
         let left = normal.energy[k] - explained;
         if best.as_ref().is_none_or(|(least, _)| left < *least) {
             let (still, rate) = weights.split_at(nodes);

@@ -30,7 +30,7 @@ pub(crate) fn still(
     let mut still = Vec::with_capacity(drive.len() - first);
     let mut rate_part = model.rate.as_ref().map(|_| Vec::with_capacity(drive.len() - first));
     let slope = if model.rate.is_some() { super::prepare::slope(time, drive, plane.range) } else { Vec::new() };
-    normal::each_row_from(memory, plane, drive, first, |k, row| {
+    normal::each_row(memory, plane, drive, first, |k, row| {
         still.push(regressor::evaluate(row, &model.still.nodes));
         if let (Some(rate), Some(part)) = (&model.rate, &mut rate_part) {
             part.push(slope[k] * regressor::evaluate(row, &rate.nodes));

@@ -12,6 +12,7 @@ use super::prepare::PreparedRecord;
 use super::start::RecordColumns;
 use super::table::Tables;
 use super::{CreepTerm, Inertia, RateModel, creep, mixed};
+use crate::least_squares::dot;
 use crate::mode::Mode;
 use specgen_numerics::nnls::Failure;
 
@@ -143,7 +144,6 @@ impl Fit<'_> {
         for (column, value) in columns.iter().zip(at) {
             target.iter_mut().zip(column).for_each(|(y, x)| *y += value * x);
         }
-        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).fold(0.0, |sum, (x, y)| sum + x * y);
         let unit: Vec<f64> = (0..unknowns).map(|k| if k + 1 < unknowns { 1.0 } else { 1e-3 }).collect();
         let mut gram =
             DMatrix::<f64>::from_fn(unknowns, unknowns, |a, b| unit[a] * unit[b] * dot(&columns[a], &columns[b]));
@@ -175,5 +175,5 @@ impl Fit<'_> {
 /// Sum of squares of errors, and of the weights that are pulled to zero.
 fn square(left: &[f64], at: &[f64]) -> f64 {
     let weights = &at[..at.len() - 1];
-    left.iter().fold(0.0, |sum, x| sum + x * x) + weights.iter().fold(0.0, |sum, w| sum + PULL * PULL * w * w)
+    dot(left, left) + weights.iter().fold(0.0, |sum, w| sum + PULL * PULL * w * w)
 }

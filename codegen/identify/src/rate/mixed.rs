@@ -3,6 +3,7 @@
 //! The free ones are eliminated (Schur complement), the rest is [`nnls`], and the free ones follow. The sums are
 //! written out in order: their bits do not depend on the CPU.
 
+use crate::least_squares::dot;
 use nalgebra::DMatrix;
 use specgen_numerics::Factor;
 use specgen_numerics::nnls::{self, Failure};
@@ -25,7 +26,6 @@ pub(super) fn solve(gram: &DMatrix<f64>, rhs: &[f64], bounded: usize) -> Result<
     // Column c: response of the free unknowns to bounded unknown c.
     let cross: Vec<Vec<f64>> = (0..bounded).map(|c| (0..free).map(|r| gram[(bounded + r, c)]).collect()).collect();
     let answer: Vec<Vec<f64>> = cross.iter().map(|column| solved(column.clone())).collect();
-    let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).fold(0.0, |sum, (x, y)| sum + x * y);
     let mut reduced = DMatrix::zeros(bounded, bounded);
     for column in 0..bounded {
         for row in column..bounded {

@@ -1,23 +1,20 @@
 //! Prediction of the displacement for a drive, and its error if the file has a displacement.
 
-use std::path::Path;
-
 use serde::Serialize;
 
 use super::open_weight;
 use super::start::RecordColumns;
 use super::{Inertia, RateModel, forward};
+use crate::branches;
 use crate::cause::{self, Cause};
 use crate::distrust::{JUMP, SETTLING};
 use crate::everett::EverettTable;
 use crate::findings::Findings;
-use crate::reading::Reading;
 use crate::record::{self, Record};
 use crate::regressor::Plane;
-use crate::signals::{self, Signals};
+use crate::signals::{self, Input};
 use crate::staircase::Staircase;
-use crate::trend::{Line, rms_and_max};
-use crate::{branches, statistics};
+use crate::statistics::{Line, extent, mean, noise_floor, rms_and_max};
 use specgen_language::diagnostic::{Diagnostic, codes};
 
 /// Fraction by which the drive may leave the range of the table; it is limited to the range.
@@ -69,29 +66,12 @@ impl Drive {
 ///
 /// # Errors
 /// All findings of the file.
-pub fn read_drive(path: &Path, shown_as: &str, reading: &Reading) -> Result<Drive, Vec<Diagnostic>> {
-    signals::read(path, shown_as, &record::wanted(false), reading).map(of_signals)
-}
-
-/// The same from the text of a file.
-///
-/// # Errors
-/// As [`read_drive`].
-pub fn parse_drive(text: &str, shown_as: &str) -> Result<Drive, Vec<Diagnostic>> {
-    signals::parse(text, shown_as, &record::wanted(false)).map(of_signals)
-}
-
-fn of_signals(signals: Signals) -> Drive {
-    let Signals { shown_as, columns, .. } = signals;
-    let mut columns = columns.into_iter();
-    let mut take = || columns.next().flatten();
-    let (time, command, monitor, micrometres) = (take().unwrap_or_default(), take(), take(), take());
-    let monitored = command.is_none();
-    let drive = command.or(monitor).unwrap_or_default();
-    let displacement = micrometres.map(|um| um.iter().map(|y| y * 1e-6).collect());
+pub fn read_drive(input: Input, shown_as: &str) -> Result<Drive, Vec<Diagnostic>> {
+    let mut signals = signals::read(input, shown_as, &record::wanted(false))?;
+    let (time, drive, monitored, displacement) = record::quantities(&mut signals);
     let held = if monitored { 0.0 } else { record::hold(&time) };
     let weightless = vec![false; time.len()];
-    Drive { shown_as, time, drive, displacement, weightless, held }
+    Ok(Drive { shown_as: signals.shown_as, time, drive, displacement, weightless, held })
 }
 
 /// Error of a prediction. Lengths in m; percentages are of `range`.
@@ -173,7 +153,7 @@ pub fn predict(model: &RateModel, drive: &Drive) -> Result<Prediction, Vec<Diagn
     let table = &model.still;
     let plane = Plane { grid: table.grid, range: [table.drive_min, table.drive_max] };
     let [bottom, top] = plane.range;
-    let (low, high) = statistics::extent(&drive.drive);
+    let (low, high) = extent(&drive.drive);
     let allowed = BEYOND * (top - bottom);
     if low < bottom - allowed || high > top + allowed {
         let message = format!("the drive goes from {low} V to {high} V, outside the table's {bottom} V to {top} V");
@@ -214,7 +194,7 @@ pub fn predict(model: &RateModel, drive: &Drive) -> Result<Prediction, Vec<Diagn
         values.iter().zip(&keep).filter(|(_, keep)| **keep).map(|(value, _)| *value).collect()
     };
     if let Some(y) = &measured {
-        let (low, high) = statistics::extent(&kept(y));
+        let (low, high) = extent(&kept(y));
         if low >= high || kept(y).len() < LEAST {
             let message = "the drive moves only in a jump, or the displacement does not move".to_owned();
             findings.add(codes::VALIDATION_IDLE, None, message, "name a record that moves the drive");
@@ -232,8 +212,7 @@ pub fn predict(model: &RateModel, drive: &Drive) -> Result<Prediction, Vec<Diagn
     for (slope, part) in slopes.iter().zip(&parts) {
         displacement.iter_mut().zip(part).for_each(|(y, p)| *y += slope * p);
     }
-    let mean = |values: &[f64]| values.iter().fold(0.0, |sum, v| sum + v) / values.len().max(1) as f64;
-    let start_on = if slopes.is_empty() { 0.0 } else { mean(&slopes) };
+    let start_on = mean(&slopes);
     let compared = measured.as_ref().map(|y| {
         let before: Vec<f64> = y.iter().zip(&displacement).map(|(y, p)| y - p).collect();
         let mut errors = before.clone();
@@ -241,13 +220,11 @@ pub fn predict(model: &RateModel, drive: &Drive) -> Result<Prediction, Vec<Diagn
         displacement.iter_mut().zip(before.iter().zip(&errors)).for_each(|(p, (all, left))| *p += all - left);
         let (at, of) = (kept(&time), kept(&errors));
         let line = Line::fit(&at, &of);
-        let left: Vec<f64> = of.iter().zip(&at).map(|(e, t)| e - line.at(*t)).collect();
         displacement.iter_mut().zip(&time).for_each(|(p, t)| *p += line.at(*t));
-        let (bottom_y, top_y) = statistics::extent(&kept(y));
+        let (bottom_y, top_y) = extent(&kept(y));
         let range = top_y - bottom_y;
-        let (rms, max) = rms_and_max(&left);
-        let gain = table.node(table.grid, 0) / (top - bottom);
-        let noise = statistics::noise_floor(y);
+        let (rms, max) = rms_and_max(&line.removed(&at, &of));
+        let (gain, noise) = (table.mean_gain(), noise_floor(y));
         PredictionError {
             samples: of.len(),
             samples_after_jumps: settled.iter().filter(|s| !**s).count(),

@@ -6,7 +6,8 @@ use crate::findings::Findings;
 use crate::mode::Mode;
 use crate::record::Record;
 use crate::regressor::Plane;
-use crate::{coverage, dead_time, selection, statistics};
+use crate::statistics::{median, median_interval};
+use crate::{coverage, dead_time, selection};
 use specgen_language::diagnostic::codes;
 
 /// Least ratio of the records' rates for an estimate of the rate dependence.
@@ -67,13 +68,12 @@ pub(super) fn prepare<'a>(record: &'a Record, plane: &Plane, findings: &mut Find
     let used = selection::usable(record, plane, findings)?;
     let slope = slope(&record.time, &record.drive, plane.range);
     let mut speeds: Vec<f64> = used.branches.iter().flat_map(|b| &slope[b.first + 1..b.end]).map(|s| s.abs()).collect();
-    let mut intervals: Vec<f64> = record.time.windows(2).map(|w| w[1] - w[0]).collect();
     let mut prepared = PreparedRecord {
         record,
         first: used.first,
-        speed: statistics::median(&mut speeds),
+        speed: median(&mut speeds),
         frequency: 0.0,
-        interval: statistics::median(&mut intervals),
+        interval: median_interval(&record.time),
         slope,
         branches: used.branches,
     };

@@ -5,12 +5,12 @@ use serde::Serialize;
 use super::period::Invertible;
 use super::predict::{Drive, predict};
 use super::prepare::PreparedRecord;
-use super::score::on;
-use super::{CreepTerm, RateModel, RateOption};
+use super::{CreepTerm, RateModel, RateOption, forward};
 use crate::mode::Mode;
 use crate::record::Record;
 use crate::regressor::Plane;
-use crate::statistics;
+use crate::staircase::Staircase;
+use crate::statistics::{extent, mean, noise_floor};
 use specgen_language::diagnostic::Diagnostic;
 
 /// Least fraction by which an option's error must be below the static table's.
@@ -125,8 +125,8 @@ pub(super) fn report(
             dead_time: model.dead_time,
             creep: model.creep.clone(),
             period: model.rate.as_ref().map(|rate| Invertible::of(&model.still, rate).period()),
-            fitted: prepared.iter().map(|p| on(model, plane, p)).collect(),
-            left_out: prepared.iter().zip(left_out).map(|(p, fits)| on(&fits[k], plane, p)).collect(),
+            fitted: prepared.iter().map(|p| error_on(model, plane, p)).collect(),
+            left_out: prepared.iter().zip(left_out).map(|(p, fits)| error_on(&fits[k], plane, p)).collect(),
             hold_out,
         })
         .collect();
@@ -139,7 +139,7 @@ pub(super) fn report(
 
 fn measured(p: &PreparedRecord) -> RateRecord {
     let y = &p.record.displacement[p.first..];
-    let (low, high) = statistics::extent(y);
+    let (low, high) = extent(y);
     RateRecord {
         record: p.record.shown_as.clone(),
         simulated: p.record.simulated,
@@ -147,12 +147,8 @@ fn measured(p: &PreparedRecord) -> RateRecord {
         speed: p.speed,
         samples: p.samples(),
         range: high - low,
-        noise_percent: 100.0 * statistics::noise_floor(y) / (high - low),
+        noise_percent: 100.0 * noise_floor(y) / (high - low),
     }
-}
-
-fn mean(values: &[f64]) -> f64 {
-    values.iter().fold(0.0, |sum, v| sum + v) / values.len() as f64
 }
 
 fn verdict(records: &[RateRecord], options: &[OptionReport], hold_out: Option<&Record>) -> Verdict {
@@ -194,4 +190,20 @@ fn verdict(records: &[RateRecord], options: &[OptionReport], hold_out: Option<&R
         lines.push(format!("no option beats the static table on every rate that it was not fitted on{held}"));
     }
     Verdict { best: best.option, beats_static, text: lines.join("\n") }
+}
+
+/// Root mean square error of a model in % of the displacement's range, on a record whose start state is known except for
+/// creep and mode, after removal of the record's own columns.
+fn error_on(model: &RateModel, plane: &Plane, p: &PreparedRecord) -> f64 {
+    let memory = Staircase::negative_saturation(plane.range);
+    let predicted = forward::predict(model, plane, p.record, p.first, memory);
+    let y = p.delayed(model.dead_time);
+    let weightless = &p.record.weightless[p.first..];
+    let compared: Vec<f64> = y.iter().zip(weightless).filter(|(_, w)| !**w).map(|(y, _)| *y).collect();
+    let times: Vec<f64> = model.creep.iter().map(|term| term.time_constant).collect();
+    let own = p.own(&times, model.inertia.map(|inertia| inertia.mode));
+    let mut errors: Vec<f64> = y.iter().zip(&predicted).map(|(y, p)| y - p).collect();
+    own.take_out(&mut errors);
+    let (low, high) = extent(&compared);
+    100.0 * (own.dot(&errors, &errors) / compared.len() as f64).sqrt() / (high - low)
 }

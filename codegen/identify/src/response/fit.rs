@@ -4,31 +4,23 @@ use nalgebra::{Cholesky, DMatrix, DVector};
 use serde::Serialize;
 
 use super::welch::Bin;
-
-/// A value and its standard error.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Estimate {
-    /// The value, in its unit.
-    pub value: f64,
-    /// Standard error, in its unit; 0 for a parameter held at zero.
-    pub error: f64,
-}
+use crate::estimate::Parameter;
 
 /// A second-order resonance with a first-order lag and a dead time, as fitted.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct ResonanceFit {
     /// Static gain K, m/V.
-    pub gain: Estimate,
+    pub gain: Parameter,
     /// Undamped resonance ω0/2π, Hz.
-    pub resonance: Estimate,
+    pub resonance: Parameter,
     /// Damping ratio ζ of the resonance.
-    pub damping_ratio: Estimate,
+    pub damping_ratio: Parameter,
     /// Time constant τ of the lag, s.
-    pub lag: Estimate,
+    pub lag: Parameter,
     /// Dead time T, s.
-    pub dead_time: Estimate,
+    pub dead_time: Parameter,
     /// τ + T, s: better determined than its parts, which look alike far below 1/τ.
-    pub lag_and_dead_time: Estimate,
+    pub lag_and_dead_time: Parameter,
     /// Correlation of the errors of τ and T.
     pub lag_dead_time_correlation: f64,
 }
@@ -220,10 +212,10 @@ fn estimates(problem: &Problem, p: &[f64; N], free: &[usize]) -> Result<Resonanc
     };
     let relative = |k: usize| {
         let value = libm::exp(p[k]);
-        Estimate { value, error: value * covariance(k, k).sqrt() }
+        Parameter { value, error: value * covariance(k, k).sqrt() }
     };
     let unit = problem.unit;
-    let time = |k: usize| Estimate { value: p[k] * unit, error: covariance(k, k).sqrt() * unit };
+    let time = |k: usize| Parameter { value: p[k] * unit, error: covariance(k, k).sqrt() * unit };
     let (lag, dead_time) = (time(3), time(4));
     let sum = covariance(3, 3) + covariance(4, 4) + 2.0 * covariance(3, 4);
     let product = lag.error * dead_time.error;
@@ -233,7 +225,7 @@ fn estimates(problem: &Problem, p: &[f64; N], free: &[usize]) -> Result<Resonanc
         damping_ratio: relative(2),
         lag,
         dead_time,
-        lag_and_dead_time: Estimate { value: lag.value + dead_time.value, error: sum.max(0.0).sqrt() * unit },
+        lag_and_dead_time: Parameter { value: lag.value + dead_time.value, error: sum.max(0.0).sqrt() * unit },
         lag_dead_time_correlation: if product > 0.0 { covariance(3, 4) * unit * unit / product } else { 0.0 },
     })
 }

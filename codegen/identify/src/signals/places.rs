@@ -2,10 +2,10 @@
 
 use super::{ColumnSpec, TIME};
 use crate::columns::names::{self, Quantity};
-use crate::columns::{Column, Header};
+use crate::columns::{Column, Head};
 use crate::findings::Findings;
 use crate::reading::Reading;
-use specgen_language::diagnostic::codes;
+use specgen_language::diagnostic::{Code, codes};
 
 /// Headers within this edit distance of a requested name are suggested.
 const NEAR: usize = 4;
@@ -22,12 +22,7 @@ pub(super) struct Places {
 }
 
 /// `None` after every problem was reported.
-pub(super) fn find(
-    header: &Header,
-    wanted: &[ColumnSpec],
-    reading: &Reading,
-    findings: &mut Findings,
-) -> Option<Places> {
+pub(super) fn find(header: &Head, wanted: &[ColumnSpec], reading: &Reading, findings: &mut Findings) -> Option<Places> {
     let search = Search { header, wanted, reading };
     let line = Some(header.line);
     let names: Vec<&str> = wanted.iter().map(|w| w.name).collect();
@@ -37,65 +32,59 @@ pub(super) fn find(
     }
     let interval = search.interval(findings);
     let mut columns = Vec::new();
-    let measured = names.contains(&MONITOR) && search.place(MONITOR, &mut Findings::new("")).is_some();
+    let measured = names.contains(&MONITOR) && matches!(search.place(MONITOR), Ok(Some(_)));
     for w in wanted {
         let counted = w.name == TIME && interval.is_some();
-        let found = if counted { search.sample_numbers(findings) } else { search.place(w.name, findings) };
-        if found.is_none() && w.required && !counted && !(w.name == DRIVE && measured) && !search.is_reported(w.name) {
+        let found = if counted { search.sample_numbers() } else { search.place(w.name) };
+        if matches!(found, Ok(None)) && w.required && !counted && !(w.name == DRIVE && measured) {
             let message = format!("column `{}` is missing; {}", w.name, search.present());
             findings.add(codes::RECORD_HEADER, line, message, &search.help(w.name));
         }
-        columns.push(found);
+        columns.push(found.unwrap_or_else(|(code, message, help)| findings.refuse(code, line, message, help)));
     }
     if findings.any_error() { None } else { Some(Places { columns, interval }) }
 }
 
+/// Code, message and help of a finding about the header.
+type Problem = (Code, String, &'static str);
+
 struct Search<'a> {
-    header: &'a Header,
+    header: &'a Head,
     wanted: &'a [ColumnSpec],
     reading: &'a Reading,
 }
 
 impl Search<'_> {
-    /// The column of the quantity `name`; two that fit equally well are reported.
-    fn place(&self, name: &'static str, findings: &mut Findings) -> Option<Column<'static>> {
+    /// The column of the quantity `name`, if there is one; two that fit equally well are a problem.
+    fn place(&self, name: &'static str) -> Result<Option<Column<'static>>, Problem> {
         if let Some((column, per)) = self.reading.column(name) {
-            return self.chosen(column, name, findings).map(|at| Column { at, name, per });
+            return self.chosen(column, name).map(|at| Some(Column { at, name, per }));
         }
-        let quantity = names::quantity(name)?;
+        let Some(quantity) = names::quantity(name) else { return Ok(None) };
         let fits = |(at, header): (usize, &String)| quantity.fits(header).map(|(fit, per)| (fit, at, per));
         let mut found: Vec<_> = self.header.names.iter().enumerate().filter_map(fits).collect();
         found.sort_by_key(|(fit, ..)| *fit);
         match found[..] {
             [(first, a, _), (second, b, _), ..] if first == second => {
                 let message = format!("column `{name}` appears twice, as columns {} and {}", a + 1, b + 1);
-                findings.add(codes::RECORD_COLUMN_TWICE, Some(self.header.line), message, "keep one of them");
-                None
+                Err((codes::RECORD_COLUMN_TWICE, message, "keep one of them"))
             }
-            [(_, at, per), ..] => Some(Column { at, name, per }),
-            [] => None,
+            [(_, at, per), ..] => Ok(Some(Column { at, name, per })),
+            [] => Ok(None),
         }
     }
 
-    /// Whether [`Search::place`] has reported why it found no column.
-    fn is_reported(&self, name: &'static str) -> bool {
-        let mut findings = Findings::new("");
-        self.place(name, &mut findings).is_none() && findings.any_error()
-    }
-
     /// The place of the column that the user named `column`.
-    fn chosen(&self, column: &str, name: &str, findings: &mut Findings) -> Option<usize> {
+    fn chosen(&self, column: &str, name: &str) -> Result<usize, Problem> {
         let names = &self.header.names;
         let named = names.iter().position(|header| header.eq_ignore_ascii_case(column));
         let numbered = || column.parse::<usize>().ok().and_then(|number| number.checked_sub(1));
         // In a file without names, any line shows whether it is long enough.
         let found = named.or_else(|| numbered().filter(|at| names.is_empty() || *at < names.len()));
-        if found.is_none() {
+        found.ok_or_else(|| {
             let message = format!("`--columns` names `{column}` for `{name}`; {}", self.present());
-            let help = "name a column as the file does, or by its number from 1";
-            findings.add(codes::RECORD_HEADER, Some(self.header.line), message, help);
-        }
-        found
+            (codes::RECORD_HEADER, message, "name a column as the file does, or by its number from 1")
+        })
     }
 
     /// Time between samples, s, if time is computed.
@@ -104,7 +93,7 @@ impl Search<'_> {
             return None;
         }
         let given = self.reading.rate().map(|rate| 1.0 / rate);
-        let has_time = self.place(TIME, &mut Findings::new("")).is_some();
+        let has_time = matches!(self.place(TIME), Ok(Some(_)));
         if given.is_none() && self.reading.sample_column().is_some() {
             let message = "`--columns` names sample numbers, but the sampling rate is missing".to_owned();
             findings.add(codes::RECORD_HEADER, Some(self.header.line), message, "give `--rate HZ`, too");
@@ -116,12 +105,12 @@ impl Search<'_> {
     }
 
     /// The column with sample numbers, if there is one.
-    fn sample_numbers(&self, findings: &mut Findings) -> Option<Column<'static>> {
+    fn sample_numbers(&self) -> Result<Option<Column<'static>>, Problem> {
         let at = match self.reading.sample_column() {
-            Some(column) => self.chosen(column, "sample", findings),
+            Some(column) => Some(self.chosen(column, "sample")?),
             None => self.header.names.iter().position(|name| names::is_sample_number(name)),
         };
-        at.filter(|_| self.reading.rate().is_some()).map(|at| Column::plain(at, "sample"))
+        Ok(at.filter(|_| self.reading.rate().is_some()).map(|at| Column::plain(at, "sample")))
     }
 
     /// What the header has.

@@ -10,7 +10,7 @@ use crate::identification as figure;
 use specgen_compiler::spec_file;
 use specgen_identify::mode::{self, Mode};
 use specgen_identify::rate::{Inertia, RateModel};
-use specgen_identify::{Drive, Prediction, declared, predict, read_drive, read_file, read_table_csv};
+use specgen_identify::{Drive, Input, Prediction, declared, predict, read_drive, read_file, read_table_csv};
 use specgen_language::outcome::{Failure, Outcome};
 use specgen_language::output::write_file;
 use specgen_language::ui::Ui;
@@ -49,7 +49,7 @@ fn inertia(options: &Options, model: &RateModel, drive: &Drive) -> Option<Inerti
 /// A file cannot be read or written, or its data are unsuitable.
 pub fn run(options: &Options, bench: &Bench, ui: &mut Ui) -> Result<(), Failure> {
     let shown = options.drive.display().to_string();
-    let drive = read_drive(&options.drive, &shown, &bench.reading).map_err(refused)?;
+    let drive = read_drive(Input::File(&options.drive, &bench.reading), &shown).map_err(refused)?;
     let mut model = model(&options.model, usize::from(options.leg), ui)?;
     // A spec's dead time counts from the voltage; a command is held before that.
     model.dead_time = options.dead_time.unwrap_or(model.dead_time) + drive.held;
@@ -60,12 +60,7 @@ pub fn run(options: &Options, bench: &Bench, ui: &mut Ui) -> Result<(), Failure>
     }
     let plot = bench.plot.write("Prediction", || figure::prediction(&prediction))?;
     let files = options.output.as_ref().map(|path| wrote(path)).into_iter().chain(plot).collect();
-    ui.result(&IdentificationResult {
-        record: shown,
-        report: prediction,
-        measured: MeasuredKeys::of(&[], false),
-        files,
-    });
+    ui.result(&IdentificationResult { report: prediction, measured: MeasuredKeys::of(&[], false), files });
     Ok(())
 }
 
@@ -125,7 +120,7 @@ pub fn summary(prediction: &Prediction) -> String {
 impl Outcome for IdentificationResult<Prediction> {
     fn text(&self) -> String {
         let report = &self.report;
-        let mut text = format!("{}: {}\n", self.record, summary(report));
+        let mut text = format!("{}: {}\n", report.record, summary(report));
         let _ = write!(
             text,
             "  displacement delayed by {:.3} ms relative to the drive column; {} samples before the drive moves are ignored",

@@ -54,7 +54,7 @@ pub fn run(
     let files = files.iter().map(|path| wrote(path)).chain(plot).collect();
     let keys = keys(&identified.report);
     let measured = MeasuredKeys::of(&keys, is_simulated(&identified.report));
-    ui.result(&IdentificationResult { record: String::new(), report: identified.report, measured, files });
+    ui.result(&IdentificationResult { report: identified.report, measured, files });
     Ok(())
 }
 

@@ -1,0 +1,202 @@
+//! `specgen identify gauge`, `response` and `stiffness`: a record in, an estimate and lines of a spec out.
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use serde::Serialize;
+
+use super::{Bench, IdentificationResult, MeasuredKeys, refused};
+use crate::drawing::wrote;
+use crate::identification as figure;
+use specgen_identify::gauge::{GaugeCalibration, calibrate, spec_line};
+use specgen_identify::response::{FrequencyResponse, respond};
+use specgen_identify::stiffness::{AxialStiffness, measure};
+use specgen_identify::{Estimate, Input, Parameter};
+use specgen_language::outcome::{Failure, Outcome};
+use specgen_language::output::write_file;
+use specgen_language::ui::Ui;
+
+/// Shows what was estimated from a record, which measures `keys` of a spec, and draws its `figure`.
+fn show<V>(
+    report: Estimate<V>,
+    keys: &[&str],
+    (title, figure): (&str, fn(&Estimate<V>) -> String),
+    bench: &Bench,
+    ui: &mut Ui,
+) -> Result<(), Failure>
+where
+    IdentificationResult<Estimate<V>>: Outcome,
+{
+    ui.findings(None, &report.warnings);
+    let files = bench.plot.write(title, || figure(&report))?.unwrap_or_default();
+    let measured = MeasuredKeys::of(keys, report.simulated);
+    ui.result(&IdentificationResult { report, measured, files });
+    Ok(())
+}
+
+/// `specgen identify stiffness`: reads, identifies, draws and shows the result.
+///
+/// # Errors
+/// A file cannot be read or written, or its data are unsuitable.
+pub fn stiffness(record: &Path, bench: &Bench, ui: &mut Ui) -> Result<(), Failure> {
+    let shown = record.display().to_string();
+    let report = measure(Input::File(record, &bench.reading), &shown).map_err(refused)?;
+    show(report, &["actuator.axial_stiffness"], ("Stiffness", figure::stiffness), bench, ui)
+}
+
+impl Outcome for IdentificationResult<Estimate<AxialStiffness>> {
+    fn text(&self) -> String {
+        let Self { report: Estimate { record, value: report, .. }, measured, files } = self;
+        let creep = report.creep_time.map_or_else(
+            || "no creep found".to_owned(),
+            |t| format!("creep of {:.2} % with {t:.3} s removed", report.creep_percent),
+        );
+        format!(
+            "{record}: k = {:.4} ± {:.4} N/µm (standard error); {creep}, drift {:.3} nm/s; without these corrections {:.4} N/µm\n  \
+             {} samples ({:.0} independent), force {:.3} N to {:.3} N, residual {:.3} nm rms\nspec lines:\n[actuator]\n\
+             axial_stiffness = \"{:.4e} N/m\"\n{}{files}",
+            report.stiffness * 1e-6,
+            report.error * 1e-6,
+            report.drift * 1e9,
+            report.uncorrected * 1e-6,
+            report.samples,
+            report.independent,
+            report.force[0],
+            report.force[1],
+            report.residual_rms * 1e9,
+            report.stiffness,
+            measured.text()
+        )
+    }
+}
+
+/// `specgen identify response`: reads, identifies, draws and shows the result.
+///
+/// # Errors
+/// A file cannot be read or written, or its data are unsuitable.
+pub fn response(record: &Path, segment: Option<usize>, bench: &Bench, ui: &mut Ui) -> Result<(), Failure> {
+    let shown = record.display().to_string();
+    let report = respond(Input::File(record, &bench.reading), &shown, segment).map_err(refused)?;
+    let keys = ["actuator.resonance", "actuator.damping_ratio", "amplifier.lag"];
+    show(report, &keys, ("Frequency response", figure::response), bench, ui)
+}
+
+impl Outcome for IdentificationResult<Estimate<FrequencyResponse>> {
+    fn text(&self) -> String {
+        let Self { report: Estimate { record, value: report, .. }, measured, files } = self;
+        let f = &report.fitted;
+        let shown_in = |e: Parameter, scale: f64| format!("{:.4} ± {:.1e}", e.value * scale, e.error * scale);
+        let mut text = format!(
+            "{record}: {} segments of {} samples at {:.1} Hz, bins of {:.3} Hz, used {:.3} to {:.1} Hz, coherence {:.4} in the middle, misfit {:.2} %\n",
+            report.segments,
+            report.segment,
+            report.rate,
+            report.resolution,
+            report.band[0],
+            report.band[1],
+            report.coherence,
+            report.misfit_percent
+        );
+        // Writing to a String cannot fail.
+        let _ = write!(
+            text,
+            "  resonance     {} Hz\n  damping ratio {}\n  lag           {} ms\n  dead time     {} ms (including half a period of converter hold)\n  lag + dead    {} ms (errors of the two correlated by {:.2})\n  static gain   {:.6} ± {:.1e} µm/V\n",
+            shown_in(f.resonance, 1.0),
+            shown_in(f.damping_ratio, 1.0),
+            shown_in(f.lag, 1e3),
+            shown_in(f.dead_time, 1e3),
+            shown_in(f.lag_and_dead_time, 1e3),
+            f.lag_dead_time_correlation,
+            f.gain.value * 1e6,
+            f.gain.error * 1e6,
+        );
+        let _ = write!(
+            text,
+            "spec lines:\n[actuator]\nresonance = \"{:.1} Hz\"  # static gain here: {:.5} um/V for small amplitude, below that of a large loop\ndamping_ratio = {:.4}\n[amplifier]\nlag = \"{:.4} ms\"\n{}{files}",
+            f.resonance.value,
+            f.gain.value * 1e6,
+            f.damping_ratio.value,
+            f.lag.value * 1e3,
+            measured.text()
+        );
+        text
+    }
+}
+
+/// `specgen identify gauge`: reads, calibrates, writes the `table`, draws and shows the result.
+///
+/// # Errors
+/// A file cannot be read or written, or its data are unsuitable.
+pub fn gauge(
+    record: &Path,
+    degree: Option<u8>,
+    table: Option<&Path>,
+    bench: &Bench,
+    ui: &mut Ui,
+) -> Result<(), Failure> {
+    let shown = record.display().to_string();
+    let report = calibrate(Input::File(record, &bench.reading), &shown, degree.map(usize::from)).map_err(refused)?;
+    ui.findings(None, &report.warnings);
+    let mut files = String::new();
+    if let Some(path) = table {
+        let rows = report.value.table.iter().fold("gauge_V,reference_um\n".to_owned(), |mut rows, [v, y]| {
+            // Writing to a String cannot fail.
+            let _ = writeln!(rows, "{v:?},{:?}", y * 1e6);
+            rows
+        });
+        write_file(path, rows.as_bytes())?;
+        files += &wrote(path);
+    }
+    files.extend(bench.plot.write("Gauge calibration", || figure::gauge(&report))?);
+    let (calibration, is_given) = (spec_line(&report.value), degree.is_some());
+    let measured = MeasuredKeys::of(&["sensor.calibration"], report.simulated);
+    ui.result(&Calibration { is_given, report, calibration, measured, files });
+    Ok(())
+}
+
+/// Calibration of a gauge.
+#[derive(Serialize)]
+struct Calibration {
+    /// The degree was given by the user.
+    #[serde(skip)]
+    is_given: bool,
+    report: Estimate<GaugeCalibration>,
+    calibration: String,
+    measured: MeasuredKeys,
+    /// One line per written file.
+    #[serde(skip)]
+    files: String,
+}
+
+impl Outcome for Calibration {
+    fn text(&self) -> String {
+        let report = &self.report.value;
+        let errors: Vec<String> =
+            report.held_out_rms.iter().enumerate().map(|(k, e)| format!("{}: {:.3} nm", k + 1, e * 1e9)).collect();
+        let chosen = if self.is_given { "given" } else { report.rule };
+        let hysteresis = report.hysteresis.map_or_else(
+            || "unknown: the reference has no reversal".to_owned(),
+            |h| format!("{:.3} nm between the rising and falling branches", h * 1e9),
+        );
+        format!(
+            "{}: {} samples, {:.4} V to {:.4} V, {:.4} µm to {:.4} µm\n  held-out error by degree: {}\n  degree {} ({chosen})\n  \
+             residual {:.3} nm rms, at most {:.3} nm (at {})\n  hysteresis {hysteresis}\n  monotonic over these voltages: smallest slope {:.1} % \
+             of the mean slope\nspec lines, in [sensor] for all gauges or in [[gauge]] for this one:\n{}\n{}{}",
+            self.report.record,
+            report.samples,
+            report.volts[0],
+            report.volts[1],
+            report.reference[0] * 1e6,
+            report.reference[1] * 1e6,
+            errors.join(", "),
+            report.degree,
+            report.residual_rms * 1e9,
+            report.residual_max * 1e9,
+            report.residual_max_at,
+            report.least_slope_percent,
+            self.calibration,
+            self.measured.text(),
+            self.files
+        )
+    }
+}
