@@ -102,36 +102,25 @@ pub(crate) fn explain(time: &[f64], drive: &[f64], residual: &[f64], noise: f64,
     let delay = total - mean_square(&left);
     let all = time.last().copied().unwrap_or(0.0) - time.first().copied().unwrap_or(0.0);
     let highest = RESOLVED * time.len() as f64 / all;
-    let hum = mains::take(&t, &pick(drive), &left, highest)
-        .map(|(frequency, rest)| (frequency, mean_square(&left) - mean_square(&rest), rest))
-        .filter(|(_, explained, _)| *explained > FOUND * total);
-    let hum = hum.map(|(frequency, explained, rest)| {
-        left = rest;
-        (frequency, explained)
-    });
-    let rung = resonance::take(time, drive, &chosen, &left);
-    let rings = rung.as_ref().map(|found| mean_square(&left) - mean_square(&found.left));
-    let resonance = rung.as_ref().map(|found| found.frequency);
-    left = rung.map_or(left, |found| found.left);
+    let hum = mains::take(&t, &pick(drive), &left, highest).filter(|hum| hum.explained > FOUND * total);
+    left = hum.as_ref().map_or(left, |hum| hum.left.clone());
+    let resonance = resonance::take(time, drive, &chosen, &left);
+    left = resonance.as_ref().map_or(left, |resonance| resonance.left.clone());
     let after_rate = mean_square(&left);
     let (creep, bend) = (creep_of(time, drive, &pick, &t, &left), bend_of(&t, &left));
     let bend =
         bend.filter(|bend| 2.0 * mean_square(&bend.left) < mean_square(&creep.left) && bend.explained > FOUND * total);
-    let bent = bend.as_ref().map(|bend| bend.explained);
-    let creep = match bend {
-        Some(bend) => creep_of(time, drive, &pick, &t, &bend.left),
-        None => creep,
-    };
-    let creeping = creep.explained;
-    let rest = after_rate - bent.unwrap_or_default() - creeping;
+    let creep = bend.as_ref().map_or(creep, |bend| creep_of(time, drive, &pick, &t, &bend.left)).explained;
+    let explained = |part: &Option<RemovedPart>| part.as_ref().map(|part| part.explained);
+    let rest = after_rate - explained(&bend).unwrap_or_default() - creep;
     let noise = if noise * noise < rest { noise * noise } else { rest };
     let share = |part: f64| if total > 0.0 { if part > 0.0 { part / total } else { 0.0 } } else { 0.0 };
     let shares: Vec<(Source, f64)> = [
         (Source::DeadTime, Some(delay)),
-        (Source::Hum, hum.map(|(_, explained)| explained)),
-        (Source::Resonance, rings),
-        (Source::BentDrift, bent),
-        (Source::Creep, Some(creeping)),
+        (Source::Hum, explained(&hum)),
+        (Source::Resonance, explained(&resonance)),
+        (Source::BentDrift, explained(&bend)),
+        (Source::Creep, Some(creep)),
         (Source::Noise, Some(noise)),
         (Source::Model, Some(rest - noise)),
     ]
@@ -140,14 +129,24 @@ pub(crate) fn explain(time: &[f64], drive: &[f64], residual: &[f64], noise: f64,
     .collect();
     let main = shares.iter().fold(shares[0], |best, s| if s.1 > best.1 { *s } else { best }).0;
     let drift_rms = if removed > 0.0 { removed.sqrt() } else { 0.0 };
-    Cause { main, shares, drift_rms, rate_delay, hum: hum.map(|(frequency, _)| frequency), resonance }
+    let frequency = |part: Option<RemovedPart>| part.map(|part| part.frequency);
+    Cause { main, shares, drift_rms, rate_delay, hum: frequency(hum), resonance: frequency(resonance) }
 }
 
 /// A part that was removed.
 struct RemovedPart {
     /// Reduction of the residual's mean square.
     explained: f64,
+    /// The residual without it.
     left: Vec<f64>,
+    /// Hz; 0 for a part without one.
+    frequency: f64,
+}
+
+impl RemovedPart {
+    fn of(before: &[f64], left: Vec<f64>, frequency: f64) -> Self {
+        Self { explained: mean_square(before) - mean_square(&left), left, frequency }
+    }
 }
 
 /// The part that a parabola over time explains.
@@ -156,7 +155,7 @@ fn bend_of(time: &[f64], left: &[f64]) -> Option<RemovedPart> {
     let line = centred(time.to_vec());
     let bent = centred(time.iter().map(|t| (t - middle) * (t - middle)).collect());
     let found = fit(&[&line, &bent], left)?;
-    Some(RemovedPart { explained: mean_square(left) - mean_square(&found.residual), left: found.residual })
+    Some(RemovedPart::of(left, found.residual, 0.0))
 }
 
 /// The part that creep explains in addition to the drive itself, so that a wrong gain does not count as creep. Time
@@ -173,24 +172,19 @@ fn creep_of(
         CREEP.iter().map(|share| centred(pick(&lagging(time, drive, share * duration)))).collect();
     let level = centred(pick(drive));
     let Some(gain) = fit(&[&level], left) else {
-        return RemovedPart { explained: 0.0, left: left.to_vec() };
+        return RemovedPart::of(left, left.to_vec(), 0.0);
     };
     let mut columns: Vec<&[f64]> = vec![&level];
-    let before = mean_square(&gain.residual);
     // The part of the gain stays with the model.
-    let mut best = Vec::new();
-    let mut explained = 0.0;
+    let mut best = RemovedPart::of(left, left.to_vec(), 0.0);
     for state in &states {
         columns.push(state);
         match fit(&columns, left) {
-            Some(found) => {
-                explained = before - mean_square(&found.residual);
-                best = found.residual;
-            }
+            Some(found) => best = RemovedPart::of(&gain.residual, found.residual, 0.0),
             None => drop(columns.pop()),
         }
     }
-    RemovedPart { explained, left: if best.is_empty() { left.to_vec() } else { best } }
+    best
 }
 
 /// First-order lag of `drive` with time constant `tau` (s), started at its first value.
@@ -248,9 +242,9 @@ mod tests {
         assert!(found.main == Source::Hum && found.hum.is_some_and(|f| (f - 49.98).abs() < 0.1), "{found:?}");
         let bent: Vec<f64> = time.iter().map(|t| 1e-9 * t * t).collect();
         assert_eq!(explain(&time, &drive, &bent, 0.0, 1e-7, &keep).main, Source::BentDrift);
-        let rings = crate::mode::Mode { frequency: 90.0, damping: 0.02 }.behind(&time, &drive);
-        let rings: Vec<f64> = rings.iter().zip(&drive).map(|(y, u)| 1e-8 * (y - u)).collect();
-        let found = explain(&time, &drive, &rings, 0.0, 1e-7, &keep);
+        let resonant = crate::mode::Mode { frequency: 90.0, damping: 0.02 }.behind(&time, &drive);
+        let resonant: Vec<f64> = resonant.iter().zip(&drive).map(|(y, u)| 1e-8 * (y - u)).collect();
+        let found = explain(&time, &drive, &resonant, 0.0, 1e-7, &keep);
         assert_eq!(found.main, Source::Resonance, "{found:?}");
         assert!((found.resonance.unwrap() / 90.0 - 1.0).abs() < 0.1, "{found:?}");
         let drift: Vec<f64> = time.iter().map(|t| 1e-8 * t).collect();

@@ -83,9 +83,9 @@ fn choose(record: &Record, drive: [f64; 2], dead_time: DeadTime, findings: &mut 
     // All grids use the finest segmentation that the record allows: they are scored on the same samples.
     let mut used = None;
     for grid in TRIED {
-        let mut unheard = Findings::new("");
+        let mut discarded = Findings::new("");
         let plane = Plane { grid, range: drive };
-        if let Some(found) = selection::usable(record, &plane, &mut unheard) {
+        if let Some(found) = selection::usable(record, &plane, &mut discarded) {
             used = Some((plane, found));
         }
     }

@@ -180,14 +180,14 @@ fn ring_of_rest(time: &[f64], y: &[f64]) -> Option<Ring> {
             best = Some((rest, mode));
         }
     }
-    let mode = refined(best?.1, 0.125 / duration, |mode| left(mode).map(|found| found.0));
+    let mode = refine(best?.1, 0.125 / duration, |mode| left(mode).map(|found| found.0));
     let (rest, amplitude) = left(mode)?;
     let rings = rest < (1.0 - EXPLAINED) * plain && amplitude > ABOVE_LEFT * rest.sqrt();
     (rings && mode.damping > LEAST_DAMPING).then_some(Ring { mode, time: time[0], amplitude, left: rest.sqrt() })
 }
 
 /// The mode near `mode` with the least `left`: steps in both directions, halved if none helps.
-fn refined(mut mode: Mode, step: f64, left: impl Fn(Mode) -> Option<f64>) -> Mode {
+fn refine(mut mode: Mode, step: f64, left: impl Fn(Mode) -> Option<f64>) -> Mode {
     let (mut wide, mut factor) = (step, 1.5);
     let mut least = left(mode).unwrap_or(f64::INFINITY);
     for _ in 0..REFINED {

@@ -31,7 +31,7 @@ impl Reading {
     /// # Errors
     /// The expected form, for the first that does not have it.
     pub fn new(columns: &[String], rate: Option<f64>) -> Result<Self, String> {
-        Ok(Self { columns: columns.iter().map(|text| chosen(text)).collect::<Result<_, _>>()?, rate })
+        Ok(Self { columns: columns.iter().map(|text| column_choice(text)).collect::<Result<_, _>>()?, rate })
     }
 
     /// Samples per second, Hz.
@@ -58,7 +58,7 @@ impl Reading {
     }
 }
 
-fn chosen(text: &str) -> Result<ColumnChoice, String> {
+fn column_choice(text: &str) -> Result<ColumnChoice, String> {
     let expected = || format!("expected a name with its unit and a column, such as drive_V=2, found `{text}`");
     let (name, column) = text.split_once('=').ok_or_else(expected)?;
     let (name, column) = (name.trim(), column.trim().to_owned());

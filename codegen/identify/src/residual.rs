@@ -48,14 +48,14 @@ impl Residual {
         normal::each_row(Staircase::negative_saturation(plane.range), plane, &record.drive, used.first, |k, row| {
             plain.push(displacement[k] - regressor::evaluate(row, &table.nodes));
         });
-        let believed = |values: &[f64]| -> Vec<f64> {
+        let with_weight = |values: &[f64]| -> Vec<f64> {
             let paired = values.iter().zip(&record.weightless[used.first..]);
             paired.take(used.end - used.first).filter(|(_, weightless)| !**weightless).map(|(v, _)| *v).collect()
         };
-        let (time, kept) = (believed(&record.time[used.first..]), believed(&plain));
+        let (time, kept) = (with_weight(&record.time[used.first..]), with_weight(&plain));
         let line = Line::fit(&time, &kept);
         let detrended = line.removed(&time, &kept);
-        let (low, high) = statistics::extent(&believed(&displacement[used.first..]));
+        let (low, high) = statistics::extent(&with_weight(&displacement[used.first..]));
         // After the end the displacement is not known.
         plain[used.end - used.first..].fill(f64::NAN);
         Self { plain, detrended, line, range: high - low }

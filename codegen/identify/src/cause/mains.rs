@@ -1,5 +1,6 @@
 //! Hum of the mains in a residual.
 
+use super::RemovedPart;
 use crate::least_squares::{fit, mean_square};
 use crate::statistics::centred;
 
@@ -15,9 +16,8 @@ const HARMONICS: f64 = 8.0;
 /// Fraction of the drive above which a frequency belongs to the drive.
 const DRIVEN: f64 = 0.001;
 
-/// The strongest hum in `left` up to `highest` (Hz) that is not one of the drive's frequencies: Hz, and the rest
-/// without it.
-pub(super) fn take(time: &[f64], drive: &[f64], left: &[f64], highest: f64) -> Option<(f64, Vec<f64>)> {
+/// The strongest hum in `left` up to `highest` (Hz) that is not one of the drive's frequencies.
+pub(super) fn take(time: &[f64], drive: &[f64], left: &[f64], highest: f64) -> Option<RemovedPart> {
     let duration = time.last()? - time.first()?;
     let step = time.len().div_ceil(SAMPLES);
     let thin = |values: &[f64]| -> Vec<f64> { values.iter().step_by(step).copied().collect() };
@@ -44,7 +44,7 @@ pub(super) fn take(time: &[f64], drive: &[f64], left: &[f64], highest: f64) -> O
             |best: Option<(f64, f64)>, found| if best.is_none_or(|best| found.1 > best.1) { Some(found) } else { best },
         );
     let (frequency, _) = best?;
-    Some((frequency, wave(frequency, time, left)?))
+    Some(RemovedPart::of(left, wave(frequency, time, left)?, frequency))
 }
 
 /// Number of changes of direction of a signal.

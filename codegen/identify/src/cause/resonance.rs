@@ -1,5 +1,6 @@
 //! Resonance in a residual: the response of a mode to the drive, beyond a wrong gain, searched over its frequency.
 
+use super::RemovedPart;
 use crate::least_squares::{fit, mean_square};
 use crate::mode::Mode;
 use crate::statistics::{centred, rates};
@@ -14,17 +15,9 @@ const NOTABLE: f64 = 0.1;
 /// Number of samples used in the search.
 const STRETCH: usize = 200_000;
 
-/// A resonance that was removed from a residual.
-pub(super) struct Resonance {
-    /// Hz.
-    pub(super) frequency: f64,
-    /// The residual without it.
-    pub(super) left: Vec<f64>,
-}
-
 /// The mode whose response to the drive explains most of `left`, a residual at the samples `chosen`, beyond a wrong
 /// gain.
-pub(super) fn take(time: &[f64], drive: &[f64], chosen: &[usize], left: &[f64]) -> Option<Resonance> {
+pub(super) fn take(time: &[f64], drive: &[f64], chosen: &[usize], left: &[f64]) -> Option<RemovedPart> {
     let end = if time.len() < STRETCH { time.len() } else { STRETCH };
     let count = chosen.partition_point(|k| *k < end);
     let (chosen, left_there) = (&chosen[..count], &left[..count]);
@@ -56,5 +49,5 @@ pub(super) fn take(time: &[f64], drive: &[f64], chosen: &[usize], left: &[f64]) 
         let gain_and_answer = best.3[1] * best.2[0][k] + best.3[2] * best.2[1][k];
         *rest -= gain_and_answer + (best.3[0] * level[k]);
     }
-    (mean_square(&rest) < mean_square(left)).then_some(Resonance { frequency: best.0, left: rest })
+    Some(RemovedPart::of(left, rest, best.0)).filter(|part| part.explained > 0.0)
 }

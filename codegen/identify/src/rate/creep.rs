@@ -9,7 +9,7 @@
 
 use nalgebra::DMatrix;
 
-use super::forward::{kept, parts};
+use super::forward::{nonzero_terms, parts};
 use super::prepare::PreparedRecord;
 use super::table::Tables;
 use super::{CreepTerm, RateModel, mixed};
@@ -54,7 +54,8 @@ pub(super) fn fit(tables: &Tables, start: &RateModel) -> Result<RateModel, Failu
             .collect();
         model.still = tables.fit(&targets)?;
         let terms = times.iter().zip(&linear.weights);
-        model.creep = kept(terms.map(|(tau, w)| CreepTerm { time_constant: *tau, weight: w / linear.scale }).collect());
+        model.creep =
+            nonzero_terms(terms.map(|(tau, w)| CreepTerm { time_constant: *tau, weight: w / linear.scale }).collect());
     }
     Ok(model)
 }

@@ -12,7 +12,7 @@ use crate::staircase::Staircase;
 pub(super) fn predict(model: &RateModel, plane: &Plane, record: &Record, first: usize, memory: Staircase) -> Vec<f64> {
     let (plain, rate) = still(model, plane, &record.time, &record.drive, first, memory);
     let time = &record.time[first..];
-    let mut sum = creeping(model, time, &plain);
+    let mut sum = with_creep(model, time, &plain);
     inertia(model, time, &record.drive[first..], &mut sum);
     sum.iter_mut().zip(rate.into_iter().flatten()).for_each(|(y, r)| *y += r);
     sum
@@ -40,7 +40,7 @@ pub(crate) fn still(
 }
 
 /// f + Σ w_j x_j of a displacement f (m) at `time` (s).
-pub(crate) fn creeping(model: &RateModel, time: &[f64], f: &[f64]) -> Vec<f64> {
+pub(crate) fn with_creep(model: &RateModel, time: &[f64], f: &[f64]) -> Vec<f64> {
     let mut sum = f.to_vec();
     for term in &model.creep {
         let x = creep(term.time_constant, time, f);
@@ -94,7 +94,7 @@ pub(super) fn parts(
     core::iter::once(f).chain(states).collect()
 }
 
-/// The f whose [`creeping`] is `y`, at rest at the first sample.
+/// The f whose [`with_creep`] is `y`, at rest at the first sample.
 pub(super) fn without_creep(model: &RateModel, time: &[f64], y: &[f64]) -> Vec<f64> {
     let total = model.creep.iter().fold(1.0, |sum, term| sum + term.weight);
     let mut f = y.first().copied().unwrap_or(0.0) / total;
@@ -125,6 +125,6 @@ pub(super) fn without_creep(model: &RateModel, time: &[f64], y: &[f64]) -> Vec<f
 pub(super) const MOST_TERMS: usize = 6;
 
 /// The same terms without those of zero weight.
-pub(super) fn kept(terms: Vec<CreepTerm>) -> Vec<CreepTerm> {
+pub(super) fn nonzero_terms(terms: Vec<CreepTerm>) -> Vec<CreepTerm> {
     terms.into_iter().filter(|term| term.weight > 0.0).collect()
 }

@@ -7,7 +7,7 @@
 
 use nalgebra::DMatrix;
 
-use super::forward::{self, kept};
+use super::forward::{self, nonzero_terms};
 use super::prepare::PreparedRecord;
 use super::start::RecordColumns;
 use super::table::Tables;
@@ -70,7 +70,7 @@ pub(super) fn fit(tables: &Tables, start: &RateModel, shape: Shape) -> Result<Ra
             break;
         }
     }
-    Ok(RateModel { creep: kept(model.creep), ..model })
+    Ok(RateModel { creep: nonzero_terms(model.creep), ..model })
 }
 
 impl Fit<'_> {
@@ -101,7 +101,7 @@ impl Fit<'_> {
         let plain = forward::static_part(model, self.tables.plane, p);
         let mut moved = vec![0.0; time.len()];
         forward::inertia(model, time, &p.record.drive[p.first..], &mut moved);
-        let whole = forward::creeping(model, time, &plain);
+        let whole = forward::with_creep(model, time, &plain);
         let mut target = p.delayed(model.dead_time);
         target.iter_mut().zip(moved).for_each(|(y, moved)| *y -= moved);
         if started {
@@ -116,7 +116,7 @@ impl Fit<'_> {
     fn left(&self, model: &RateModel) -> Vec<f64> {
         let each = self.tables.records.iter().zip(&self.own).flat_map(|(p, own)| {
             let time = &p.record.time[p.first..];
-            let mut y = forward::creeping(model, time, &forward::static_part(model, self.tables.plane, p));
+            let mut y = forward::with_creep(model, time, &forward::static_part(model, self.tables.plane, p));
             forward::inertia(model, time, &p.record.drive[p.first..], &mut y);
             let mut left = p.delayed(model.dead_time);
             left.iter_mut().zip(y).for_each(|(left, y)| *left -= y);

@@ -178,7 +178,7 @@ pub fn predict(model: &RateModel, drive: &Drive) -> Result<Prediction, Vec<Diagn
     };
     let (below, above) = (run(false), run(true));
     let open: Vec<f64> = above.0.iter().zip(&below.0).map(|(a, b)| a - b).collect();
-    let finish = |values: &[f64]| later(&time, &forward::creeping(model, &time, values), model.dead_time);
+    let finish = |values: &[f64]| later(&time, &forward::with_creep(model, &time, values), model.dead_time);
     let mut displacement = finish(&below.0);
     let mut moved = vec![0.0; time.len()];
     forward::inertia(model, &time, &drive.drive[first..], &mut moved);

@@ -130,14 +130,14 @@ pub(super) fn report(
             hold_out,
         })
         .collect();
-    let records: Vec<RateRecord> = prepared.iter().map(measured).collect();
+    let records: Vec<RateRecord> = prepared.iter().map(figures_of).collect();
     let verdict = verdict(&records, &options, hold_out);
     let hold_out = hold_out.map(|record| HoldOut { record: record.shown_as.clone() });
     let held = mean(&prepared.iter().map(|p| p.record.held()).collect::<Vec<_>>());
     Ok(RateReport { grid: plane.grid, records, held, mode, hold_out, options, verdict })
 }
 
-fn measured(p: &PreparedRecord) -> RateRecord {
+fn figures_of(p: &PreparedRecord) -> RateRecord {
     let y = &p.record.displacement[p.first..];
     let (low, high) = extent(y);
     RateRecord {
@@ -160,7 +160,7 @@ fn verdict(records: &[RateRecord], options: &[OptionReport], hold_out: Option<&R
         if option.option.runs() && mean(&option.left_out) < mean(&best.left_out) {
             best = option;
         }
-        let beaten = |ours: f64, theirs: f64| ours < theirs * (1.0 - BEATS);
+        let is_better = |ours: f64, theirs: f64| ours < theirs * (1.0 - BEATS);
         let cases = option
             .left_out
             .iter()
@@ -171,7 +171,7 @@ fn verdict(records: &[RateRecord], options: &[OptionReport], hold_out: Option<&R
             option.hold_out.zip(plain.hold_out).map(|(ours, theirs)| ("the held-out record".to_owned(), ours, theirs));
         let cases: Vec<(String, f64, f64)> = cases.chain(held).collect();
         let say = |won: bool| -> Vec<String> {
-            let kept = cases.iter().filter(|(_, ours, theirs)| beaten(*ours, *theirs) == won);
+            let kept = cases.iter().filter(|(_, ours, theirs)| is_better(*ours, *theirs) == won);
             kept.map(|(name, ours, theirs)| format!("{name} ({ours:.3} against {theirs:.3} %)")).collect()
         };
         let (won, lost) = (say(true), say(false));
