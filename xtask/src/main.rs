@@ -36,8 +36,7 @@ const USAGE: &str = "usage: cargo xtask COMMAND
   bless   updates the generated files that are committed
   book    builds the documentation as HTML, with the generated pages, into target/book
   changelog VERSION: merges the fragments in changelog/ into CHANGELOG.md, as a release
-  release VERSION [-o DIR]: builds sources, the command for Linux (glibc, static), the wheel, the book, and their digests into
-          target/dist
+  release VERSION [-o DIR]: builds sources, Linux binaries (glibc, static), wheel, book and digests into target/dist
   fresh   runs the two commands of the README in minimal Debian systems; see `cargo xtask fresh --help`
 
 With SPECGEN_ALLOW_MISSING=1, steps that need a tool that cannot be installed are skipped and reported.";

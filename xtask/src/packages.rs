@@ -155,10 +155,7 @@ pub fn advisories(root: &Path, manifests: &[String]) -> Outcome {
     if failed.is_empty() {
         return Outcome::Passed;
     }
-    Outcome::Failed(format!(
-        "known defects, or no database ({DATABASE} can name a checkout of it): {}",
-        failed.join(", ")
-    ))
+    Outcome::Failed(format!("known defects, or no database (a checkout: {DATABASE}): {}", failed.join(", ")))
 }
 
 #[cfg(test)]

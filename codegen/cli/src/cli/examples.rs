@@ -58,8 +58,7 @@ Examples:
   specgen build legs.toml --target host -o legs-host
       a shared library for this computer
   specgen build platform.toml --target stm32h743 -o controller  # (minutes)
-      an image for the NUCLEO-H743ZI2
-      (with --assumed-ok if values of the spec are still assumed)
+      an image for the NUCLEO-H743ZI2; --assumed-ok permits assumed values
   specgen build platform.toml --target rt-pc -o controller  # (minutes)
       the program of a real-time PC
   specgen build platform.toml --target qemu --no-measure  # (minutes)
@@ -155,8 +154,7 @@ Examples:
   specgen identify predict legs.toml 10hz.csv -o predicted.csv --plot predicted.svg
       the model of leg 0 of the spec, with its creep and dead time
 
-Without displacement_um, displacement is predicted relative to negative
-saturation.";
+Without displacement_um, the output is relative to negative saturation.";
 
 pub const OPERATE: &str = "\
 Examples:

@@ -293,8 +293,7 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
             // clap requires both unless there is a subcommand.
             let (Some(record), Some(drive)) = (record, drive) else {
                 return Err(Failure::Usage(
-                    "expected a record and --drive, or one of linear, response, gains, gauge, predict, stiffness, rate"
-                        .to_owned(),
+                    "expected a record and --drive, or a command: see `specgen identify --help`".to_owned(),
                 ));
             };
             everett::run(record, *drive, *grid, validate.as_deref(), output.as_deref(), &bench.bench()?, ui)

@@ -71,8 +71,7 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     let named = arguments.line.is_named();
     if named != arguments.machine.is_some() {
-        let missing =
-            if named { "--machine NAME: a correction is played only on its machine" } else { "--port or --socket" };
+        let missing = if named { "--machine NAME: a correction fits only its machine" } else { "--port or --socket" };
         return Err(Failure::Usage(format!("learning on a machine also needs {missing}")));
     }
     if named && (arguments.plant.plant.is_some() || arguments.plant.no_noise || arguments.frequency.is_some()) {

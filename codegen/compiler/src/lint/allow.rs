@@ -91,7 +91,7 @@ lints! {
     ALLOWED_NOTHING = "W0892";
 }
 
-/// Turns warnings and [`FAR_OFF`] errors into notes if the spec allows their keys.
+/// Turns warnings and `FAR_OFF` errors into notes if the spec allows their keys.
 pub fn allow(model: &Model, findings: &mut [Diagnostic]) {
     for finding in findings {
         if finding.severity != Severity::Warning && finding.code != FAR_OFF {

@@ -148,7 +148,7 @@ fn near_defaults(facts: &Facts, found: &mut Findings) {
     }
 }
 
-/// Drops [`FAR_FROM_DEFAULT`] for values that have an error.
+/// Drops `FAR_FROM_DEFAULT` for values that have an error.
 pub fn say_once(findings: &mut Vec<Diagnostic>) {
     let list = |key: &str| key.split('[').next().unwrap_or_default().to_owned();
     let errors = findings.iter().filter(|one| one.severity == Severity::Error);

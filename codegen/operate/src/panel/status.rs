@@ -144,15 +144,11 @@ pub fn message(status: &Status, rules: &Supervision, model: &Model) -> StatusMes
             };
             message(kind, what, advice)
         }
-        Some(Phase::Holding) if what.is_empty() => {
-            message("note", "Holding. The law is suspended.", "Run to continue.")
-        }
+        Some(Phase::Holding) if what.is_empty() => message("note", "Holding. The law is suspended.", "Run resumes."),
         Some(Phase::Holding) => message("warning", &format!("Holding. {what}"), advice),
         Some(Phase::RampingDown) if of == Cause::None => message("note", "Ramping down.", ""),
         Some(Phase::RampingDown) => message("error", &format!("Ramping down. {what}"), advice),
         Some(Phase::Faulted) => message("error", what, advice),
-        None => {
-            message("error", "The machine reports an unknown phase.", "Use the same specgen for panel and controller.")
-        }
+        None => message("error", "The machine reports an unknown phase.", "Use matching specgen versions."),
     }
 }
