@@ -3,6 +3,7 @@
 
 use controller::DESCRIPTION;
 use controller::snapshot::recorder::Recorder;
+use heapless::Vec;
 use specgen_runtime::Crc32;
 use specgen_runtime::record::write_header;
 
@@ -52,7 +53,6 @@ impl Download {
         mut look: impl RecorderAccess,
     ) -> Option<(u32, &'p [u8])> {
         let offset = usize::try_from(offset).unwrap_or(usize::MAX);
-        let mut words = [0; WORDS];
         let (mut place, mut total) = (Place::End, 0);
         if !look(&mut |recorder| (place, total) = find(recorder, offset)) {
             return None;
@@ -60,14 +60,14 @@ impl Download {
         let range = match place {
             Place::Header => header(offset, piece),
             Place::Block(block, _, byte) => {
-                let count = copied(block, byte / WORD, &mut words, &mut look)?;
-                let words = words.get(..count).unwrap_or_default();
-                self.sum(block, byte / WORD, words);
+                let mut words = Vec::new();
+                copied(block, byte / WORD, &mut words, &mut look)?;
+                self.sum(block, byte / WORD, &words);
                 let bytes = words.iter().flat_map(|word| word.to_le_bytes());
                 for (slot, value) in piece.iter_mut().zip(bytes) {
                     *slot = value;
                 }
-                byte % WORD..count * WORD
+                byte % WORD..words.len() * WORD
             }
             Place::Checksum(block, length, byte) => {
                 self.catch_up(block, length, &mut look)?;
@@ -100,13 +100,12 @@ impl Download {
             (self.crc, self.block, self.summed) = (Crc32::new(), block, 0);
         }
         while self.summed < length {
-            let mut words = [0; WORDS];
-            let first = self.summed;
-            let count = copied(block, first, &mut words, look)?;
-            if count == 0 {
+            let mut words = Vec::new();
+            copied(block, self.summed, &mut words, look)?;
+            if words.is_empty() {
                 return None;
             }
-            self.sum(block, first, words.get(..count).unwrap_or_default());
+            self.sum(block, self.summed, &words);
         }
         Some(())
     }
@@ -150,28 +149,23 @@ fn find(recorder: &Recorder<'static>, offset: usize) -> (Place, usize) {
     (place, start)
 }
 
-/// Copies words of a block, a few at a time; returns their number. None if it records again.
-fn copied(block: usize, first: usize, out: &mut [u64; WORDS], look: &mut impl RecorderAccess) -> Option<usize> {
-    let mut count = 0;
-    for few in out.chunks_exact_mut(AT_ONCE) {
-        let before = count;
-        if !look(&mut |recorder| count += copy(recorder, block, first + before, few)) {
+/// Copies words of a block, a few at a time. None if it records again.
+fn copied(block: usize, first: usize, out: &mut Vec<u64, WORDS>, look: &mut impl RecorderAccess) -> Option<()> {
+    for _ in 0..WORDS / AT_ONCE {
+        let before = out.len();
+        let copy = &mut |recorder: &Recorder<'static>| {
+            let words = recorder.block(block).and_then(|words| words.get(first + before..)).unwrap_or_default();
+            for word in words.iter().take(AT_ONCE) {
+                // There is room for each of them.
+                let _ = out.push(*word);
+            }
+        };
+        if !look(copy) {
             return None;
         }
-        if count < before + AT_ONCE {
+        if out.len() < before + AT_ONCE {
             break;
         }
     }
-    Some(count)
-}
-
-/// Copies words of a block; how many.
-fn copy(recorder: &Recorder<'static>, block: usize, first: usize, out: &mut [u64]) -> usize {
-    let words = recorder.block(block).and_then(|words| words.get(first..)).unwrap_or_default();
-    let mut count = 0;
-    for (slot, word) in out.iter_mut().zip(words) {
-        *slot = *word;
-        count += 1;
-    }
-    count
+    Some(())
 }

@@ -3,6 +3,7 @@
 use controller::supervised::{MACHINE_INPUT_WORDS, MACHINE_OUTPUT_WORDS, Machine, Phase, Request as Wanted};
 use controller::waves::{self, Wave};
 use controller::{CONFIG_WORDS, Config, PLACE_WORDS, Real, passes, place_words};
+use heapless::Vec;
 use specgen_link::lockstep::Session;
 use specgen_link::samples::Block;
 use specgen_link::{
@@ -319,25 +320,24 @@ impl Backend for RequestContext<'_, '_> {
         offset: u32,
         knots: impl for<'p> Fn(&'p Player<'static, Real>) -> &'p [Knot],
     ) -> Result<Reply<'_>, Refusal> {
-        let (mut taken, mut count, mut total) = ([[0; 6]; KNOTS], 0, 0);
+        let (mut taken, mut total) = (Vec::<Knot, KNOTS>::new(), 0);
         let first = offset as usize / KNOT;
-        for few in taken.chunks_exact_mut(KNOTS_AT_ONCE) {
-            let before = count;
+        for _ in 0..KNOTS / KNOTS_AT_ONCE {
+            let before = taken.len();
             self.locked(Err(Refusal::Unsupported), |exchange, _| {
                 let knots = knots(idle_player(exchange)?);
                 total = knots.len() * KNOT;
-                for (slot, knot) in few.iter_mut().zip(knots.iter().skip(first + before)) {
-                    *slot = *knot;
-                    count += 1;
+                for knot in knots.iter().skip(first + before).take(KNOTS_AT_ONCE) {
+                    // There is room for each of them.
+                    let _ = taken.push(*knot);
                 }
                 Ok(())
             })?;
-            if count < before + KNOTS_AT_ONCE {
+            if taken.len() < before + KNOTS_AT_ONCE {
                 break;
             }
         }
-        let taken = taken.get(..count).unwrap_or_default();
-        let bytes = Bytes(put_knots(taken, offset as usize - first * KNOT, self.handler.session.buffer()));
+        let bytes = Bytes(put_knots(&taken, offset as usize - first * KNOT, self.handler.session.buffer()));
         Ok(Reply::Chunk { offset, total: total as u32, bytes })
     }
 

@@ -2,6 +2,7 @@
 
 use controller::supervised::{MACHINE_INPUT_WORDS, MACHINE_OUTPUT_WORDS, Request as Wanted};
 use controller::{COMMAND_WORDS, CONFIG_WORDS, Config, DESCRIPTION, PLACE_WORDS, Real, passes, triggers};
+use heapless::Vec;
 use specgen_link::lockstep::piece;
 use specgen_link::{
     Bytes, CostUnit, EdgeStatus, Health, Identity, KNOT, KNOTS, PassAction, PassStatus, RecorderAction, RecorderStatus,
@@ -220,12 +221,11 @@ fn put_knots(backend: &mut impl Backend, first: u32, knots: Bytes<'_>) -> Result
     backend.authorise()?;
     // Not [`Refusal::Message`]: the sequence number of an unreadable message is used again.
     let whole = Refusal::Length { expected: (KNOTS * KNOT / size_of::<u64>()) as u16 };
-    let given = knots.knots().filter(|given| given.len() <= KNOTS).ok_or(whole)?;
-    let (mut taken, count) = ([[0; 6]; KNOTS], given.len());
-    for (slot, knot) in taken.iter_mut().zip(given) {
-        *slot = knot;
+    let mut taken = Vec::<Knot, KNOTS>::new();
+    for knot in knots.knots().ok_or(whole)? {
+        taken.push(knot).map_err(|_| whole)?;
     }
-    backend.put_knots(first, taken.get(..count).unwrap_or_default())
+    backend.put_knots(first, &taken)
 }
 
 /// Fills `row`, if there are as many words.

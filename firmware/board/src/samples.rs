@@ -3,6 +3,7 @@
 use controller::limits::DAC;
 use controller::supervised::{Machine, MachineOutput};
 use controller::{LEGS, PLACE_WORDS, Real, passes};
+use heapless::spsc::Queue;
 use specgen_link::Refusal;
 use specgen_link::samples::{AXES, Block, Collector, MOST_EVERY, ROW, ROW_OF_ONE, Sample};
 
@@ -46,17 +47,19 @@ pub fn sample(tick: u64, status: u32, phase: u8, shown: [[Real; AXES]; 2], volts
     for (error, pose) in error.iter_mut().zip(pose) {
         *error -= pose;
     }
-    let [pose, target, error, volts] = [pose, target, error, volts].map(rounded);
+    let (pose, target, error, volts) = (rounded(pose), rounded(target), rounded(error), rounded(volts));
     Sample { tick, status, phase, pose, target, error, volts }
 }
 
 /// Memory for samples, 6 KiB. It need not be initialised.
 #[derive(Debug)]
 pub struct SampleMemory {
-    copies: [TickSample; COPIES],
+    copies: Copies,
     rows: Rows,
 }
 
+/// A queue holds one less than its size. Every bit pattern is one, so that its memory need not be initialised.
+type Copies = Queue<TickSample, { COPIES + 1 }>;
 pub(crate) type Rows = Collector<[Block; BLOCKS]>;
 
 impl Default for SampleMemory {
@@ -69,8 +72,7 @@ impl SampleMemory {
     /// Zeros.
     #[must_use]
     pub const fn new() -> Self {
-        let nothing = TickSample { tick: 0, status: 0, phase: 0, shown: [[0.0; AXES]; 2], codes: [0; LEGS] };
-        Self { copies: [nothing; COPIES], rows: Collector::new([Block::EMPTY; BLOCKS]) }
+        Self { copies: Queue::new(), rows: Collector::new([Block::EMPTY; BLOCKS]) }
     }
 }
 
@@ -81,10 +83,7 @@ pub(crate) struct Samples {
     pub(crate) every: u32,
     /// Whether rows start afresh; also at power-up, when their memory is not initialised.
     pub(crate) anew: bool,
-    /// A ring: the oldest, and the number of waiting copies.
-    copies: &'static mut [TickSample; COPIES],
-    first: usize,
-    waiting: usize,
+    copies: &'static mut Copies,
     /// None while the background uses it.
     pub(crate) rows: Option<&'static mut Rows>,
     /// Bits per second of the line.
@@ -94,7 +93,8 @@ pub(crate) struct Samples {
 impl Samples {
     pub(crate) fn new(memory: &'static mut SampleMemory, baud: u32) -> Self {
         let SampleMemory { copies, rows } = memory;
-        Self { every: 0, anew: true, copies, first: 0, waiting: 0, rows: Some(rows), baud }
+        *copies = Queue::new();
+        Self { every: 0, anew: true, copies, rows: Some(rows), baud }
     }
 
     /// Starts rows of `every` ticks; 0 stops them.
@@ -105,7 +105,8 @@ impl Samples {
         if every > 0 && !fits(every, self.baud) {
             return Err(Refusal::Rate { least: least(self.baud) });
         }
-        (self.every, self.anew, self.waiting) = (every, true, 0);
+        (self.every, self.anew) = (every, true);
+        *self.copies = Queue::new();
         Ok(())
     }
 
@@ -119,19 +120,13 @@ impl Samples {
 
     #[inline(never)]
     fn copy(&mut self, tick: u64, machine: &Machine, output: &MachineOutput) {
-        let Some(shown) = passes::shown(&machine.state).filter(|_| self.waiting < COPIES) else { return };
-        if let Some(slot) = self.copies.get_mut((self.first + self.waiting) % COPIES) {
-            let (status, phase) = (output.tick.status, output.phase.word() as u8);
-            *slot = TickSample { tick, status, phase, shown, codes: output.tick.dac_code };
-            self.waiting += 1;
-        }
+        let Some(shown) = passes::shown(&machine.state) else { return };
+        let (status, phase) = (output.tick.status, output.phase.word() as u8);
+        let _ = self.copies.enqueue(TickSample { tick, status, phase, shown, codes: output.tick.dac_code });
     }
 
     pub(crate) fn pop(&mut self) -> Option<TickSample> {
-        self.waiting = self.waiting.checked_sub(1)?;
-        let oldest = self.first;
-        self.first = (oldest + 1) % COPIES;
-        self.copies.get(oldest).copied()
+        self.copies.dequeue()
     }
 }
 

@@ -62,7 +62,7 @@ const PARTS: [Part; 11] = [
         folder: "link",
         member: false,
         what: "the protocol between a board and the host",
-        needs: "packages `cobs`, `crc`, `postcard`, `serde`",
+        needs: "packages `cobs`, `crc`, `heapless`, `postcard`, `serde`",
         with: &[],
     },
     Part {
