@@ -91,17 +91,15 @@ impl ControlMode {
     }
 }
 
-/// As users write it, such as `P/F pcc`.
+/// As users write it, such as `P/F pcc`. Inlined, so that no controller links the formatting code.
 impl fmt::Display for ControlMode {
+    #[inline]
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (loops, law) = match self {
-            Self::P => return f.write_str("P"),
-            Self::F(law) => ("F ", law),
-            Self::PF(law) => ("P/F ", law),
-        };
-        // Not `write!`: its formatting has a panic path.
-        f.write_str(loops)?;
-        f.write_str(law.name())
+        match self {
+            Self::P => f.write_str("P"),
+            Self::F(law) => write!(f, "F {}", law.name()),
+            Self::PF(law) => write!(f, "P/F {}", law.name()),
+        }
     }
 }
 
