@@ -14,7 +14,8 @@
 //! | `columns`, `container`, `record` | the reader of CSV, MATLAB, HDF5 and TDMS files; checked samples |
 //! | `normal`, `selection`, `residual` | normal equations, choice of the grid, causes of the residual |
 //! | [`rate`] | records at several rates: dead time, dynamic Preisach (6), creep, each tested on the rate it was not fitted on |
-//! | [`linear`], [`response`], [`gauge`], [`stiffness`], [`gains`] | other records to values of the spec |
+//! | [`response`], [`gauge`], [`stiffness`] | another record to an [`Estimate`] of values of the spec |
+//! | [`linear`], [`gains`] | records at several frequencies, and runs of a machine, to values of the spec |
 //! | [`declared`] | the records that a spec names, compared with the spec |
 //! | [`waveform`] | tables of poses from CSV, every bad row reported |
 
@@ -59,7 +60,6 @@ pub mod waveform;
 
 use crate::everett::EverettTable;
 use findings::Findings;
-use mode::Mode;
 use residual::Residual;
 use specgen_language::diagnostic::{Diagnostic, codes};
 use specgen_numerics::nnls;
@@ -93,15 +93,13 @@ pub struct Options {
     pub drift: bool,
     /// Source of the time by which the displacement lags the drive.
     pub dead_time: DeadTime,
-    /// The mode after the table, if it is known from elsewhere than the ring of a record.
-    pub mode: Option<Mode>,
 }
 
 impl Options {
     /// Usual choices: no drift within a branch, dead time estimated where the record allows it.
     #[must_use]
     pub const fn new(grid: usize, drive: [f64; 2]) -> Self {
-        Self { grid, drive, drift: false, dead_time: DeadTime::Estimate, mode: None }
+        Self { grid, drive, drift: false, dead_time: DeadTime::Estimate }
     }
 }
 

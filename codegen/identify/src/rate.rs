@@ -139,8 +139,8 @@ pub struct RateIdentification {
 
 /// Fits every option to `records`, at least two at different rates, and tests each at the rate it was not fitted on.
 ///
-/// `hold_out` is excluded from all fits. `options.drift` and `options.dead_time` are not used. Without `options.mode`
-/// the mode is that of the clearest ring in a record.
+/// `hold_out` is excluded from all fits. `options.drift` and `options.dead_time` are not used. The mode is that of the
+/// clearest ring in a record.
 ///
 /// # Errors
 /// All findings if a record cannot identify the table, or if the records have one rate only.
@@ -169,7 +169,7 @@ pub fn identify_rate(
     if findings.any_error() {
         return Err(findings.into_diagnostics());
     }
-    let mode = options.mode.or_else(|| rings(records));
+    let mode = clearest_mode(records);
     let everything: Vec<usize> = (0..prepared.len()).collect();
     let fitted = fit::all(&plane, &prepared, &everything, mode, &mut findings);
     let mut left_out = Vec::new();
@@ -189,7 +189,7 @@ pub fn identify_rate(
 }
 
 /// The mode of the clearest ring in any of the records.
-fn rings(records: &[Record]) -> Option<Mode> {
+fn clearest_mode(records: &[Record]) -> Option<Mode> {
     let clear = |ring: &Ring| ring.amplitude / ring.left;
     records
         .iter()

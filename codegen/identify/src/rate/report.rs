@@ -91,7 +91,7 @@ pub struct RateReport {
     /// Part of each dead time that is the hold of the records' commands, s: half a sampling interval, averaged over the
     /// records.
     pub held: f64,
-    /// The mode behind the last option, given or from a ring.
+    /// The mode behind the last option, from a ring in a record.
     pub mode: Option<Mode>,
     /// The record held out.
     pub hold_out: Option<HoldOut>,
