@@ -15,15 +15,8 @@ const LEG_TOLERANCE: f64 = 0.1;
 /// Relative tolerance of the axial stiffness of a leg.
 const STIFFNESS_TOLERANCE: f64 = 0.05;
 
-/// Range of the nominal axial stiffness of random plants, relative to the parameter file's.
-const STIFFNESS_RANGE: [f64; 2] = [0.7, 1.4];
-
-/// Range of the damping ratio of the lowest mode of random plants.
-const DAMPING_RANGE: [f64; 2] = [0.01, 0.05];
-
-/// Streams of random numbers, apart from those of gauges, amplifiers and sensors.
+/// Stream of random numbers, apart from those of gauges, amplifiers and sensors.
 const TOLERANCE_STREAM: u64 = 1 << 32;
-const NOMINAL_STREAM: u64 = 2 << 32;
 
 /// A machine: its nominal data, and the actual legs.
 #[derive(Debug, Clone, PartialEq)]
@@ -74,22 +67,6 @@ impl Specimen {
         Self::within_tolerances(&PlatformParameters::reference(), &LegParameters::reference(), 1)
     }
 
-    /// Random machine `number` of `seed`: nominal stiffness 0.7 to 1.4 times the reference platform's, damping ratio 1
-    /// to 5 %, and tolerances as usual.
-    #[must_use]
-    pub fn random(seed: u64, number: u32) -> Self {
-        let mut rng = ChaCha8Rng::seed_from_u64(seed);
-        rng.set_stream(NOMINAL_STREAM + u64::from(number));
-        let mut within = |[low, high]: [f64; 2]| low + (high - low) * unit(&mut rng);
-        let mut nominal = PlatformParameters::reference();
-        nominal.axial_stiffness_n_per_m *= within(STIFFNESS_RANGE);
-        nominal.modal_damping = within(DAMPING_RANGE);
-        nominal.name = format!("random-{seed}-{number}");
-        // Far from the seeds in common use.
-        let tolerances = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15).wrapping_add(u64::from(number));
-        Self::within_tolerances(&nominal, &LegParameters::reference(), tolerances)
-    }
-
     /// Its structure: c_i = β k_i with β = 2ζ/ω_1 of the nominal platform.
     #[must_use]
     pub fn structure(&self) -> StructureParameters {
@@ -119,18 +96,5 @@ mod tests {
         assert!(gains.iter().all(|g| g.abs() <= 0.1) && gains.iter().any(|g| g.abs() > 0.05), "{gains:?}");
         assert!(specimen.stiffness.iter().all(|k| (k / 1e7 - 1.0).abs() <= 0.05));
         assert!(specimen.legs.windows(2).all(|pair| pair[0] != pair[1]));
-    }
-
-    #[test]
-    fn random_machines_fill_their_ranges() {
-        let machines: Vec<Specimen> = (0..50).map(|n| Specimen::random(7, n)).collect();
-        let ks: Vec<f64> = machines.iter().map(|m| m.nominal.axial_stiffness_n_per_m).collect();
-        let zetas: Vec<f64> = machines.iter().map(|m| m.nominal.modal_damping).collect();
-        assert!(ks.iter().all(|k| (0.7e7..=1.4e7).contains(k)) && zetas.iter().all(|z| (0.01..=0.05).contains(z)));
-        assert!(ks.iter().any(|k| *k < 0.8e7) && ks.iter().any(|k| *k > 1.3e7));
-        assert!(zetas.iter().any(|z| *z < 0.015) && zetas.iter().any(|z| *z > 0.045));
-        assert_eq!(machines[3], Specimen::random(7, 3));
-        assert_ne!(machines[3].legs, machines[4].legs);
-        assert_ne!(machines[3], Specimen::random(8, 3));
     }
 }

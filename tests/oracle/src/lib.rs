@@ -1,7 +1,7 @@
 //! Controllers in plain f64, written independently of the emitted ones: oracles for them and for the plants' figures.
 //! Only for tests: slow, with unbounded memory. This file has the leg controller, `platform` that of poses.
 //!
-//! Inputs that exercise a controller's bits in `stimulus`, and their replay.
+//! Inputs that exercise a controller's bits in `stimulus`, and their replay; machines in `random`.
 //!
 //! Hysteresis by `preisach`; run-to-run adaptation (AII.3), (AII.5), (AII.6) in the filter form.
 
@@ -15,6 +15,7 @@ mod linear;
 mod notch;
 pub mod platform;
 mod preisach;
+pub mod random;
 pub mod replay;
 pub mod stimulus;
 

@@ -52,7 +52,7 @@ pub fn machines(count: usize) -> Vec<Machine> {
         }),
     ];
     let kinds = kinds.map(|(name, specimen)| (name.to_owned(), specimen()));
-    let random = (0..12).map(|number| (format!("random-{number}"), Specimen::random(1, number)));
+    let random = (0..12).map(|number| (format!("random-{number}"), oracle::random::machine(1, number)));
     kinds
         .into_iter()
         .chain(random)

@@ -157,7 +157,7 @@ pub fn plants() -> u32 {
 const LEAD: (&str, &str) = ("transfer_time   =", "lead = \"0.1 ms\"\ntransfer_time   =");
 
 fn of(what: &str, number: u32, edits: &[(&str, &str)]) -> Bench {
-    let specimen = Specimen::random(SEED, number);
+    let specimen = oracle::random::machine(SEED, number);
     let records = records(&specimen.legs, 32);
     let edits: Vec<_> = edits.iter().copied().chain([LEAD]).collect();
     Bench::with_records(&format!("tables-{what}-{number}"), specimen, &records, &edits)

@@ -112,7 +112,8 @@ fn halving_the_step_shows_second_order_and_a_nanometre_at_most() {
 #[test]
 fn the_same_voltages_give_the_same_bits() {
     let run = |volts: f64| {
-        let mut plant = prepared(&Specimen::random(3, 4));
+        let mut plant =
+            prepared(&Specimen::within_tolerances(&PlatformParameters::reference(), &LegParameters::reference(), 3));
         plant.touch(WorkPart::aluminium());
         raised(&mut plant, volts, 0.05).map(f64::to_bits)
     };

@@ -3,6 +3,7 @@
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 
+use crate::random::unit;
 use host_sim::word::Scalar;
 
 /// In a stretch of special numbers, one word in this many is special.
@@ -31,7 +32,7 @@ impl RandomSource {
 
     /// Uniform in [0, 1).
     pub(super) fn unit(&mut self) -> f64 {
-        (self.0.next_u64() >> 11) as f64 / (1_u64 << 53) as f64
+        unit(&mut self.0)
     }
 
     /// Uniform in [−1, 1).
