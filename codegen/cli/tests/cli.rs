@@ -84,7 +84,7 @@ fn arguments_that_make_no_sense_are_usage_errors() {
         (&["pil", "legs.toml", "--baud", "9600"], "--port"),
         (&["pil", "reference.toml", "--scenario", "case-3"], "there is no scenario `case-3`"),
         (&["pil", "reference.toml", "--samples", "100"], "runs at its timing.period"),
-        (&["pil", "reference.toml", "--trajectory", "case-3"], "but not `case-3`"),
+        (&["pil", "reference.toml", "--trajectory", "case-3"], "has no trajectory `case-3`"),
         (&["operate"], "--port"),
         (&["gcs"], "--port"),
         (&["gcs", "--socket", "y", "--axis", "1=Q"], "with an axis of X Y Z U V W"),

@@ -73,8 +73,8 @@ fn bad_states_are_refused_in_words() {
         ("short.csv", "x,y,z\n1,2,3\n", "there are 3 columns, expected 18"),
         ("unnamed.csv", "0,0,0.18,0,0,0,0,0,0,0,0,0,0,0,0,0,0,0\n", "names the columns, but `0` is a number"),
         ("nan.csv", "NAMES\n0,0,NaN,0,0,0,0,0,0,0,0,0,0,0,0,0,0,0\n", "`z` is `NaN`, not a finite number"),
-        ("tilted.csv", "NAMES\n0,0,0.18,0,0.8,0,0,0,0,0,0,0,0,0,0,0,0,0\n", "beyond"),
-        ("far.csv", "NAMES\n0,0,0.5,0,0,0,0,0,0,0,0,0,0,0,0,0,0,0\n", "beyond"),
+        ("tilted.csv", "NAMES\n0,0,0.18,0,0.8,0,0,0,0,0,0,0,0,0,0,0,0,0\n", "range of the dynamics"),
+        ("far.csv", "NAMES\n0,0,0.5,0,0,0,0,0,0,0,0,0,0,0,0,0,0,0\n", "range of the dynamics"),
     ] {
         folder.write(name, content.replace("NAMES", "x,y,z,a,b,c,vx,vy,vz,va,vb,vc,ax,ay,az,aa,ab,ac"));
         folder.run(&["dynamics", "reference.toml", "--states", name]).says(1, &[words, name]);

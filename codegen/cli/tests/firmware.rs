@@ -193,9 +193,5 @@ fn an_image_of_this_machine_is_weighed_without_the_checks_of_another() {
     let own: PathBuf = std::env::current_exe().unwrap();
     let run = folder.run(&["size", &own.display().to_string()]);
     assert_eq!(run.code, 0, "{run:#?}");
-    assert!(
-        run.stdout.contains("flash by owner") && run.stdout.contains("only for Cortex-M images"),
-        "{}",
-        run.stdout
-    );
+    assert!(run.stdout.contains("flash by owner") && run.stdout.contains("only for Cortex-M images"), "{}", run.stdout);
 }

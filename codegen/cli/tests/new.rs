@@ -121,7 +121,7 @@ fn what_cannot_be_is_refused_by_its_option_and_nothing_of_the_users_is_touched()
     // Answers that are only inconsistent together are kept in the refused spec.
     let heavy = ["--mass", "900 kg", "--inertia", "1 kg m^2, 1 kg m^2, 1.2 kg m^2"];
     let together = folder.run(&[&["new", "heavy", "--like", "reference"], &heavy[..]].concat());
-    together.says(1, &["E0459", "heavy is written"]);
+    together.says(1, &["E0459", "wrote heavy"]);
     assert!(folder.read("heavy/platform.toml").contains("900 kg"));
 }
 

@@ -309,7 +309,7 @@ fn a_fault_ends_a_script_with_its_cause_and_lines_go_on_after_a_mistake() {
     let parts: Vec<&str> = run.stdout.split("events since the last status request: ").collect();
     let [_, first, second] = parts[..] else { panic!("{run:#?}") };
     assert!(first.starts_with("link lost, converter\n") || first.starts_with("converter\n"), "{first}");
-    assert!(first.contains("converter: all bits of the ADC's frame are the same"), "{first}");
+    assert!(first.contains("converter: all bits of the ADC's frame are equal"), "{first}");
     assert!(second.starts_with("none\n"), "{second}");
 }
 

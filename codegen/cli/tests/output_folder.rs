@@ -219,7 +219,7 @@ fn a_file_of_the_user_is_not_overwritten() {
     let folder = Folder::new();
     write(&folder);
     folder.write("out/notes.txt", "mine");
-    refused(&folder, "out", 1, &["`out` holds files", "notes.txt", "nothing was written", "-o"]);
+    refused(&folder, "out", 1, &["`out` contains files", "notes.txt", "nothing was written", "-o"]);
     fs::remove_file(folder.path("out/notes.txt")).unwrap();
 
     folder.write("out/law/src/platform/step.rs", folder.read("out/law/src/platform/step.rs") + "// tuned by hand\n");

@@ -345,7 +345,11 @@ fn learned_errors_have_a_row_a_gate_and_parts() {
         line.split_once("measured over ").unwrap().1.to_owned()
     };
     assert!(!over("each ").is_empty() && !over("learning from 2 passes on each, ").is_empty(), "{}", single.stdout);
-    assert!(single.stdout.contains(" nm after learning from ") && single.stdout.contains(" passes over "), "{}", single.stdout);
+    assert!(
+        single.stdout.contains(" nm after learning from ") && single.stdout.contains(" passes over "),
+        "{}",
+        single.stdout
+    );
     let report: Value = serde_json::from_slice(&std::fs::read(folder.path("single/report.json")).unwrap()).unwrap();
     let table = folder.read("single/runs.csv");
     let (head, rows) = table.split_once('\n').unwrap();

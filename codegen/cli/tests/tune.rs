@@ -237,10 +237,7 @@ fn candidates_of_a_file_have_the_scores_of_the_search() {
     assert_eq!(names, ["level", "drift"]);
     for (text, says) in [
         ("[{\"level\": 2}]", "candidate 0, from 0: level is 2, outside its bounds"),
-        (
-            "[{}, {\"kp[0]\": 1}]",
-            "candidate 1, from 0: no tuned parameter is called `kp[0]`; expected level, drift",
-        ),
+        ("[{}, {\"kp[0]\": 1}]", "candidate 1, from 0: no tuned parameter is called `kp[0]`; expected level, drift"),
         ("[{\"level\": null}]", "expected an array of objects"),
         ("{}", "expected an array of objects"),
     ] {

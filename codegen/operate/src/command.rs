@@ -136,9 +136,7 @@ impl ModeRequest {
         if ControlMode::WORDS.iter().any(|(name, _)| *name == text || name.split('-').next() == Some(text)) {
             return Ok(Self(text.to_owned()));
         }
-        Err(format!(
-            "expected p, f or pf, the last two optionally with a law, -invhys, -ewma or -pcc; found `{text}`"
-        ))
+        Err(format!("expected p, f or pf, the last two optionally with a law, -invhys, -ewma or -pcc; found `{text}`"))
     }
 
     /// The word of the mode; `now` is the current one.

@@ -5,7 +5,7 @@ use core::fmt;
 use crate::adaptation::Law;
 use crate::choice::{Choice, choice};
 
-/// Control mode of section 4. What is asked of a mode is a field of [`Capabilities`].
+/// Control mode of section 4. Its capabilities are the four methods below, which name every mode.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ControlMode {
     /// P: position tracking (7) on a linear leg, u = q/ρ̂; no hysteresis model, no adaptation.
@@ -16,19 +16,6 @@ pub enum ControlMode {
     PF(Law),
 }
 
-/// What a control mode does.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Capabilities {
-    /// Whether (7) feeds the pose error back.
-    pub feeds_back: bool,
-    /// Whether that feedback has `position_gains` in place of `gains`.
-    pub own_gains: bool,
-    /// Whether the legs go through the inverse Preisach model; if not, they are taken as linear.
-    pub inverts: bool,
-    /// Whether active damping, if there is any, is active: only together with the feedback it was designed for.
-    pub damps_modes: bool,
-}
-
 impl ControlMode {
     /// Names in commands and tables, each with its word, from word 0 on.
     pub const WORDS: [(&'static str, u32); 7] =
@@ -37,15 +24,43 @@ impl ControlMode {
     /// Meaning of the words in the documentation of the settings.
     pub const MEANING: &'static str = "0 P; 1, 2, 3 F with Invhys, EWMA, PCC; 4, 5, 6 P/F with the same.";
 
-    /// Its row in the table of capabilities.
+    /// Whether (7) feeds the pose error back.
     #[inline]
     #[must_use]
-    pub const fn capabilities(self) -> Capabilities {
-        let none = Capabilities { feeds_back: false, own_gains: false, inverts: false, damps_modes: false };
+    pub const fn feeds_back(self) -> bool {
         match self {
-            Self::P => Capabilities { feeds_back: true, own_gains: true, ..none },
-            Self::F(_) => Capabilities { inverts: true, ..none },
-            Self::PF(_) => Capabilities { feeds_back: true, inverts: true, damps_modes: true, ..none },
+            Self::P | Self::PF(_) => true,
+            Self::F(_) => false,
+        }
+    }
+
+    /// Whether that feedback has `position_gains` in place of `gains`.
+    #[inline]
+    #[must_use]
+    pub const fn own_gains(self) -> bool {
+        match self {
+            Self::P => true,
+            Self::F(_) | Self::PF(_) => false,
+        }
+    }
+
+    /// Whether the legs go through the inverse Preisach model; if not, they are taken as linear.
+    #[inline]
+    #[must_use]
+    pub const fn inverts(self) -> bool {
+        match self {
+            Self::P => false,
+            Self::F(_) | Self::PF(_) => true,
+        }
+    }
+
+    /// Whether active damping, if there is any, is active: only together with the feedback it was designed for.
+    #[inline]
+    #[must_use]
+    pub const fn damps_modes(self) -> bool {
+        match self {
+            Self::P | Self::F(_) => false,
+            Self::PF(_) => true,
         }
     }
 

@@ -451,7 +451,7 @@ fn the_wiring_check_names_gauges_that_are_exchanged_or_turned_and_lets_a_good_ma
             }
             Some(what) => {
                 assert_eq!(verdict["what"], what);
-                assert!(verdict["advice"].as_str().is_some_and(|advice| advice.starts_with("Exchange")), "{verdict:#}");
+                assert!(verdict["advice"].as_str().is_some_and(|advice| advice.starts_with("Swap")), "{verdict:#}");
                 page.phase("faulted");
                 page.refused(json!({ "do": "check" }), "acknowledge");
                 page.done(json!({ "do": "begin", "request": "acknowledge" }));

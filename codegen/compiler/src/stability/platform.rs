@@ -124,7 +124,7 @@ pub fn design(model: &Model, task: &TaskSpace, plant: &RestDynamics) -> Result<D
     refusal::check(model, task, &closed_loop, &combined, &position)?;
     let margins: Vec<ModeMargins> = ControlMode::all()
         .map(|law| {
-            let tuning = if law.capabilities().own_gains { &position } else { &combined };
+            let tuning = if law.own_gains() { &position } else { &combined };
             ModeMargins::of(&closed_loop, law, tuning, ratios)
         })
         .collect();
@@ -176,7 +176,7 @@ impl Design {
     /// The numbers of a mode.
     #[must_use]
     pub fn tuning(&self, mode: ControlMode) -> &Tuning {
-        if mode.capabilities().own_gains { &self.position } else { &self.combined }
+        if mode.own_gains() { &self.position } else { &self.combined }
     }
 
     /// The closed loop of the spec without tuning; `task` is its `[control]`.

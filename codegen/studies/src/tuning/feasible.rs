@@ -65,7 +65,7 @@ impl Feasibility {
         // A running controller may be switched to any of them; the one of the spec is asked first.
         let own = start_mode(model, task);
         let mut laws = vec![own];
-        if !own.capabilities().own_gains {
+        if !own.own_gains() {
             let others = [LoopKind::Estimates, LoopKind::Combined].into_iter().flat_map(LoopKind::modes);
             laws.extend(others.filter(|law| *law != own));
         }
@@ -81,7 +81,7 @@ impl Feasibility {
             }
             (Self::Platform { closed_loop, laws, ratios, required }, Setting::Platform { period, .. }) => {
                 laws.iter().all(|law| {
-                    let tuning = setting.tuning(law.capabilities().own_gains);
+                    let tuning = setting.tuning(law.own_gains());
                     platform_holds(closed_loop, *law, &tuning, *ratios, required, *period)
                 })
             }

@@ -123,11 +123,10 @@ impl Space {
         let mut parameters = Vec::new();
         let mut add = |role: Role, bounds: [f64; 2]| parameters.push(Parameter { role, bounds });
         let mut stiffness = [1.0; 6];
-        let has = mode.map(ControlMode::capabilities);
-        let alone = has.is_some_and(|has| has.own_gains);
+        let alone = mode.is_some_and(ControlMode::own_gains);
         if let Some(design) = &compiled.design {
             stiffness = axis_stiffness(model);
-            if what != TunedNumbers::Weights && has.is_some_and(|has| has.feeds_back) {
+            if what != TunedNumbers::Weights && mode.is_some_and(ControlMode::feeds_back) {
                 let damped = if alone { design.position } else { design.combined }.derivative != [0.0; 6];
                 (0..6).for_each(|axis| add(Role::Proportional(axis), PROPORTIONAL));
                 (0..6).for_each(|axis| add(Role::Integral(axis), INTEGRAL));

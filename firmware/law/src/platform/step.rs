@@ -103,7 +103,7 @@ pub fn advance<P: Platform>(
     state.limited = limited != 0;
     let mut static_inverse = 0;
     for (index, leg) in state.legs.iter().enumerate() {
-        static_inverse |= ((config.mode.capabilities().inverts && leg.memory.fell_back()) as u32) << (24 + index);
+        static_inverse |= ((config.mode.inverts() && leg.memory.fell_back()) as u32) << (24 + index);
     }
     let inputs = if wrench_good { 0 } else { WRENCH_FAULT } | if correction_held { CORRECTION_LIMITED } else { 0 };
     static_inverse | limited | gauge_faults << 8 | setpoint_status | inputs
@@ -156,10 +156,10 @@ fn enter_mode<P: Platform>(p: P, config: &Config<P>, state: &mut State<P>) -> bo
     if mode.law() == Law::Invhys {
         state.innovation_notch = NotchState::new();
     }
-    if !mode.capabilities().damps_modes {
+    if !mode.damps_modes() {
         state.damping.rest();
     }
-    if !mode.capabilities().feeds_back {
+    if !mode.feeds_back() {
         state.integral = Integral::new();
         state.error_notch = NotchState::new();
         state.error = [P::Real::ZERO; 6];
@@ -179,8 +179,7 @@ fn hand_over<P: Platform>(p: P, config: &Config<P>, state: &mut State<P>, reques
         for (estimate, held) in state.estimates.iter_mut().zip(transform(p.legs_to_modes(), &held)) {
             estimate.level = estimate.level - held;
         }
-    } else if mode.capabilities().feeds_back && config.active_gains().integral.iter().all(|gain| *gain > P::Real::ZERO)
-    {
+    } else if mode.feeds_back() && config.active_gains().integral.iter().all(|gain| *gain > P::Real::ZERO) {
         state.integral.grow(&transform(p.legs_to_wrench(), &held));
     } else {
         offset = held;
@@ -219,7 +218,7 @@ fn weaken<T: Real>(fallback: Fallback, values: &mut [T; 6]) {
 #[cold]
 fn rest<P: Platform>(p: P, config: &Config<P>, state: &mut State<P>) {
     let mode = config.mode;
-    if mode.capabilities().feeds_back && mode.law() != Law::Invhys {
+    if mode.feeds_back() && mode.law() != Law::Invhys {
         let held = transform(p.force_to_modes(), &state.integral.force);
         for (estimate, held) in state.estimates.iter_mut().zip(held) {
             estimate.level = estimate.level - held;
@@ -251,10 +250,10 @@ pub fn learn<P: Platform>(p: P, config: &Config<P>, state: &mut State<P>) {
     let mode = config.mode;
     let error = modal_error(p, &difference(&state.generator.target().pose, &state.pose));
     let fallback = state.fallback;
-    if mode.capabilities().damps_modes && fallback == Fallback::None {
+    if mode.damps_modes() && fallback == Fallback::None {
         state.damping.act(p.damping(), &error);
     }
-    if mode.capabilities().feeds_back {
+    if mode.feeds_back() {
         state.error = notch_error(p, &mut state.error_notch, &error);
         if fallback != Fallback::None {
             weaken(fallback, &mut state.error);
@@ -340,7 +339,7 @@ pub fn known_load<P: Platform>(p: P, config: &Config<P>, state: &State<P>) -> ([
 /// J⁻ᵀ(k_p e + s)/k_a − δ̂ − φ̂, plus the damping request and J c: m of each leg.
 #[inline]
 pub fn reaction<P: Platform>(p: P, config: &Config<P>, state: &mut State<P>) -> [P::Real; LEGS] {
-    if config.mode.capabilities().feeds_back {
+    if config.mode.feeds_back() {
         let proportional = force_of(&config.active_gains().proportional, &state.error);
         let integral = &state.integral.force;
         let force = each(|axis| proportional[axis] + integral[axis]);
@@ -365,7 +364,7 @@ pub fn actuate<P: Platform>(
     table: &P::Table,
     request: P::Real,
 ) -> bool {
-    if config.mode.capabilities().inverts && track(p, config, leg, table, request) {
+    if config.mode.inverts() && track(p, config, leg, table, request) {
         return false;
     }
     actuate_limited(p, config, leg, table, request)
@@ -405,7 +404,7 @@ fn actuate_limited<P: Platform>(
         limited |= held_back;
         p.dac().drive(permitted)
     };
-    if config.mode.capabilities().inverts {
+    if config.mode.inverts() {
         let out_of_reach = memory.follow_within(table, request, &mut permitted);
         limited |= out_of_reach;
         leg.requested = leg.memory.displacement();
@@ -421,5 +420,5 @@ fn actuate_limited<P: Platform>(
 /// Displacement that the present code requests, in the leg model of a mode, m.
 #[inline]
 fn requested<P: Platform>(p: P, mode: ControlMode, leg: &LegState<P>) -> P::Real {
-    if mode.capabilities().inverts { leg.memory.displacement() } else { p.dac().drive(leg.code) * p.metres_per_cell() }
+    if mode.inverts() { leg.memory.displacement() } else { p.dac().drive(leg.code) * p.metres_per_cell() }
 }

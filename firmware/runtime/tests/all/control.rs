@@ -290,9 +290,9 @@ fn a_transfer_fades_to_nothing_without_subnormal_numbers() {
 
 #[test]
 fn modes_say_what_is_at_work() {
-    assert!(ControlMode::P.capabilities().feeds_back && !ControlMode::P.capabilities().inverts);
-    assert!(!ControlMode::F(Law::Ewma).capabilities().feeds_back && ControlMode::F(Law::Ewma).capabilities().inverts);
-    assert!(ControlMode::PF(Law::Pcc).capabilities().feeds_back && ControlMode::PF(Law::Pcc).capabilities().inverts);
+    assert!(ControlMode::P.feeds_back() && !ControlMode::P.inverts());
+    assert!(!ControlMode::F(Law::Ewma).feeds_back() && ControlMode::F(Law::Ewma).inverts());
+    assert!(ControlMode::PF(Law::Pcc).feeds_back() && ControlMode::PF(Law::Pcc).inverts());
     assert_eq!(ControlMode::PF(Law::Pcc).law(), Law::Pcc);
     assert_eq!(ControlMode::P.law(), Law::Invhys);
     // A mode has one name: with capitals for people, without for commands.

@@ -146,7 +146,7 @@ struct Assembly<'a> {
 
 impl<'a> Assembly<'a> {
     fn new(of: &'a ClosedLoop, law: ControlMode, tuning: &'a Tuning, conditions: &'a Conditions) -> Self {
-        let feeds_back = law.capabilities().feeds_back;
+        let feeds_back = law.feeds_back();
         let adapts = law.law() != Law::Invhys && tuning.level_bandwidth != 0.0;
         let drifts = adapts && law.law() == Law::Pcc && tuning.drift_bandwidth != 0.0;
         let integrating = if feeds_back { used(&tuning.integral) } else { Vec::new() };
@@ -160,7 +160,7 @@ impl<'a> Assembly<'a> {
         let history = take(6 * libm::ceil(conditions.delay) as usize);
         let error_notch = take(notch(feeds_back));
         let innovation_notch = take(notch(adapts));
-        let active_damping = take(if of.active_damping.is_some() && law.capabilities().damps_modes { 12 } else { 0 });
+        let active_damping = take(if of.active_damping.is_some() && law.damps_modes() { 12 } else { 0 });
         let last_feedback = take(if feeds_back && adapts { 6 } else { 0 });
         let integral = take(integrating.len());
         let level = take(if adapts { 6 } else { 0 });
@@ -186,7 +186,7 @@ impl<'a> Assembly<'a> {
             tuning,
             conditions,
             feeds_back,
-            damps_modes: law.capabilities().damps_modes,
+            damps_modes: law.damps_modes(),
             adapts,
             drifts,
             integrating,

@@ -41,8 +41,7 @@ impl LoopKind {
     /// That of a mode.
     #[must_use]
     pub fn of(mode: ControlMode) -> Self {
-        let capabilities = mode.capabilities();
-        match (capabilities.feeds_back, capabilities.own_gains) {
+        match (mode.feeds_back(), mode.own_gains()) {
             (true, true) => Self::Position,
             (true, false) => Self::Combined,
             (false, _) if mode.law() != Law::Invhys => Self::Estimates,

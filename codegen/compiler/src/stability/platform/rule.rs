@@ -60,8 +60,7 @@ pub(super) fn combined(
     // A mode is fixed if the spec gives all that it uses.
     let (fixed, free): (Vec<ControlMode>, Vec<_>) =
         [LoopKind::Estimates, LoopKind::Combined].into_iter().flat_map(LoopKind::modes).partition(|mode| {
-            (given.gains.is_some() || !mode.capabilities().feeds_back)
-                && (given.bandwidths.is_some() || mode.law() == Law::Invhys)
+            (given.gains.is_some() || !mode.feeds_back()) && (given.bandwidths.is_some() || mode.law() == Law::Invhys)
         });
     if free.is_empty() {
         return given.over(&start);
