@@ -5,7 +5,7 @@ use core::fmt;
 use crate::adaptation::Law;
 use crate::choice::{Choice, choice};
 
-/// Control mode of section 4. Its capabilities are the four methods below, which name every mode.
+/// Control mode of section 4. Its capabilities are the first four methods below.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ControlMode {
     /// P: position tracking (7) on a linear leg, u = q/ρ̂; no hysteresis model, no adaptation.
@@ -28,40 +28,28 @@ impl ControlMode {
     #[inline]
     #[must_use]
     pub const fn feeds_back(self) -> bool {
-        match self {
-            Self::P | Self::PF(_) => true,
-            Self::F(_) => false,
-        }
+        !matches!(self, Self::F(_))
     }
 
     /// Whether that feedback has `position_gains` in place of `gains`.
     #[inline]
     #[must_use]
     pub const fn own_gains(self) -> bool {
-        match self {
-            Self::P => true,
-            Self::F(_) | Self::PF(_) => false,
-        }
+        matches!(self, Self::P)
     }
 
     /// Whether the legs go through the inverse Preisach model; if not, they are taken as linear.
     #[inline]
     #[must_use]
     pub const fn inverts(self) -> bool {
-        match self {
-            Self::P => false,
-            Self::F(_) | Self::PF(_) => true,
-        }
+        !matches!(self, Self::P)
     }
 
     /// Whether active damping, if there is any, is active: only together with the feedback it was designed for.
     #[inline]
     #[must_use]
     pub const fn damps_modes(self) -> bool {
-        match self {
-            Self::P | Self::F(_) => false,
-            Self::PF(_) => true,
-        }
+        matches!(self, Self::PF(_))
     }
 
     /// Every mode, in the order of the words.

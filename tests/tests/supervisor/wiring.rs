@@ -332,7 +332,7 @@ fn no_fault_free_machine_is_refused() {
     let emitted = Emitted::new("supervisor-wiring", "reference.toml", &[]);
     let compiled = &emitted.compiled;
     let mut supervised = Supervised::new(emitted.at_run_time());
-    let machines = specgen_tests::length(9, 200);
+    let machines = specgen_tests::length(6, 200);
     let refused: Vec<String> = (0..machines)
         .filter_map(|number| {
             let word = arm(&mut supervised, &mut random(compiled, number), compiled).word;
@@ -394,7 +394,7 @@ fn vibration_blames_no_gauge_or_leg() {
     let emitted = Emitted::new("supervisor-wiring", "reference.toml", &[]);
     let compiled = &emitted.compiled;
     let mut supervised = Supervised::new(emitted.at_run_time());
-    let (machines, amplitudes) = specgen_tests::length((6, &[(20e-9, 3)][..]), (26, &[(20e-9, 8), (40e-9, 20)]));
+    let (machines, amplitudes) = specgen_tests::length((4, &[(20e-9, 3)][..]), (26, &[(20e-9, 8), (40e-9, 20)]));
     for &(amplitude, most) in amplitudes {
         let mut refused = 0;
         for number in 0..machines {
