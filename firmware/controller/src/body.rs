@@ -4,9 +4,9 @@
 
 //! What the inverse dynamics know of the platform and its legs.
 
-use crate::Real;
 use specgen_runtime::Platform;
 use specgen_runtime::dynamics::Leg;
+use crate::Real;
 
 /// Constants of the platform; from `geometry`, `platform` and `leg`.
 ///

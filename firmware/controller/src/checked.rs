@@ -4,70 +4,24 @@
 
 //! What the controller checks itself by, see [`crate::integrity`].
 
-use crate::{CONFIG_WORDS, hysteresis, setpoint};
 use core::hint::black_box;
 use specgen_runtime::Crc32;
+use crate::{CONFIG_WORDS, hysteresis, setpoint};
 
 /// CRC-32 (ISO-HDLC) of [`IDENTITY`], the tables, the trajectories and [`SETTINGS`]; computed by specgen.
 pub const CRC: u32 = 0x9a8a5b6c;
 
 /// The spec's settings, in the order of [`crate::CONFIG_NAMES`]: what `Config::new().to_words()` gives.
 pub static SETTINGS: [u64; CONFIG_WORDS] = [
-    0x6,
-    0x0,
-    0x3fa8bc3bf1b4ae12,
-    0x3f6169e49195ba08,
-    0x6d3,
-    0x0,
-    0xaaaa,
-    0x411eee5617ee30ff,
-    0x411eee5617ee30fa,
-    0x413e4f94f408e782,
-    0x40c36621e3dcbd20,
-    0x40c36621e3dcbd21,
-    0x40c34f2dfb8663ce,
-    0x41db5c954c83afa7,
-    0x41db5c954c83afa2,
-    0x41fad0260757e79c,
-    0x4181290e192e04df,
-    0x4181290e192e04e0,
-    0x418114c040e72319,
-    0x0,
-    0x0,
-    0x0,
-    0x0,
-    0x0,
-    0x0,
-    0x411658ff7b879cff,
-    0x411658ff7b879cfc,
-    0x4135e64c423c3180,
-    0x40bc080fb0f0e334,
-    0x40bc080fb0f0e335,
-    0x40bbe6e50136ac60,
-    0x41fda737900adff5,
-    0x41fda737900adff1,
-    0x421d0f055fa36d40,
-    0x41a298f932f7f400,
-    0x41a298f932f7f400,
-    0x41a282f808e603cc,
-    0x0,
-    0x0,
-    0x0,
-    0x0,
-    0x0,
-    0x0,
-    0x0,
-    0x0,
-    0x0,
-    0x0,
-    0x0,
-    0x0,
-    0x0,
-    0x0,
-    0x0,
-    0x0,
-    0x0,
-    0x0,
+    0x6, 0x0, 0x3fa8bc3bf1b4ae12, 0x3f6169e49195ba08, 0x6d3, 0x0, 0xaaaa,
+    0x411eee5617ee30ff, 0x411eee5617ee30fa, 0x413e4f94f408e782, 0x40c36621e3dcbd20,
+    0x40c36621e3dcbd21, 0x40c34f2dfb8663ce, 0x41db5c954c83afa7, 0x41db5c954c83afa2,
+    0x41fad0260757e79c, 0x4181290e192e04df, 0x4181290e192e04e0, 0x418114c040e72319, 0x0,
+    0x0, 0x0, 0x0, 0x0, 0x0, 0x411658ff7b879cff, 0x411658ff7b879cfc, 0x4135e64c423c3180,
+    0x40bc080fb0f0e334, 0x40bc080fb0f0e335, 0x40bbe6e50136ac60, 0x41fda737900adff5,
+    0x41fda737900adff1, 0x421d0f055fa36d40, 0x41a298f932f7f400, 0x41a298f932f7f400,
+    0x41a282f808e603cc, 0x0, 0x0, 0x0, 0x0, 0x0, 0x0, 0x0, 0x0, 0x0, 0x0, 0x0, 0x0, 0x0,
+    0x0, 0x0, 0x0, 0x0, 0x0,
 ];
 
 /// Where this controller comes from, in one line, and what of that nobody measured, in a second. It lies in every image

@@ -4,14 +4,35 @@
 
 //! Six gauges that see the platform: where they are, what their words mean, and the filter of the pose's rate.
 
-use crate::Real;
 use specgen_runtime::{Calibration, GaugeConverter, Gauges, RateFilter};
+use crate::Real;
 
 /// Lines and planes at rest; the passes leave 1.5e-15 m and 1.0e-14 rad over the declared workspace. From `gauge` and `workspace`.
 pub const GAUGES: Gauges<'static, Real> = Gauges {
-    direction: [[0.0, 0.0, 1.0], [0.0, 0.0, 1.0], [0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]],
-    normal: [[0.0, 0.0, 1.0], [0.0, 0.0, 1.0], [0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]],
-    skew: [[0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]],
+    direction: [
+        [0.0, 0.0, 1.0],
+        [0.0, 0.0, 1.0],
+        [0.0, 0.0, 1.0],
+        [0.0, 1.0, 0.0],
+        [0.0, 1.0, 0.0],
+        [1.0, 0.0, 0.0],
+    ],
+    normal: [
+        [0.0, 0.0, 1.0],
+        [0.0, 0.0, 1.0],
+        [0.0, 0.0, 1.0],
+        [0.0, 1.0, 0.0],
+        [0.0, 1.0, 0.0],
+        [1.0, 0.0, 0.0],
+    ],
+    skew: [
+        [0.0, 0.0, 0.0],
+        [0.0, 0.0, 0.0],
+        [0.0, 0.0, 0.0],
+        [0.0, 0.0, 0.0],
+        [0.0, 0.0, 0.0],
+        [0.0, 0.0, 0.0],
+    ],
     pierced: [
         [0.08, 0.0, 0.0],
         [-0.04, 0.069282, 0.0],
@@ -48,12 +69,25 @@ pub const CALIBRATION: Option<Meaning> = None;
 pub type Meaning = Calibration<Real, 1>;
 
 /// Lowest and highest word of each gauge that is believed, m: readings within `sensor.range`, where the gauge means one reading by one word.
-pub const RAW_LIMITS: [[Real; 2]; 6] =
-    [[-5.5e-5, 5.5e-5], [-5.5e-5, 5.5e-5], [-5.5e-5, 5.5e-5], [-5.5e-5, 5.5e-5], [-5.5e-5, 5.5e-5], [-5.5e-5, 5.5e-5]];
+pub const RAW_LIMITS: [[Real; 2]; 6] = [
+    [-5.5e-5, 5.5e-5],
+    [-5.5e-5, 5.5e-5],
+    [-5.5e-5, 5.5e-5],
+    [-5.5e-5, 5.5e-5],
+    [-5.5e-5, 5.5e-5],
+    [-5.5e-5, 5.5e-5],
+];
 
 /// First-order filter of the pose's rate; from `velocity_cutoff` and `timing.period`.
-pub const RATE: RateFilter<Real> = RateFilter { keep: 0.14956861922263504, gain: 8504.31380777365 };
+pub const RATE: RateFilter<Real> = RateFilter {
+    keep: 0.14956861922263504,
+    gain: 8504.31380777365,
+};
 
 /// What the gauges' converters mean by a code of 0..2^bits, m; a code at either end is a gauge fault. From `sensor`.
-pub const CONVERTER: GaugeConverter<Real> =
-    GaugeConverter { at_zero: -5.5e-5, per_code: 8.392333984375e-10, highest: 131071, beyond: [-0.000165, 0.000165] };
+pub const CONVERTER: GaugeConverter<Real> = GaugeConverter {
+    at_zero: -5.5e-5,
+    per_code: 8.392333984375e-10,
+    highest: 131071,
+    beyond: [-0.000165, 0.000165],
+};

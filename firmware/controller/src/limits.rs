@@ -4,8 +4,8 @@
 
 //! What may go out.
 
-use crate::Real;
 use specgen_runtime::Dac;
+use crate::Real;
 
 /// Converter codes in volts and in cells of the Everett grid; from `dac` and `actuator.voltage`.
 pub const DAC: Dac<Real> = Dac {

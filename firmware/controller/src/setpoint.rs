@@ -5,8 +5,8 @@
 //! Set-points: limits of bias, moves and streams, user frames, trajectories.
 #![allow(clippy::approx_constant)]
 
-use crate::Real;
 use specgen_runtime::setpoint::*;
+use crate::Real;
 
 /// What the generator of set-points needs to know; from `control.setpoint`, `control.frames`, `workspace`, `timing.period`
 /// and `trajectory`.
@@ -18,51 +18,35 @@ pub const SETPOINTS: Setpoints<Real, UserFrames> = Setpoints {
     home: [0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
     bound: [5e-5, 5e-5, 5.2e-5, 0.0004, 0.00035, 0.0005],
     limits: MoveLimits {
-        speed: [100000000.0, 100000000.0, 100000000.0, 10000000.0, 10000000.0, 10000000.0],
+        speed: [
+            100000000.0, 100000000.0, 100000000.0, 10000000.0, 10000000.0, 10000000.0,
+        ],
         acceleration: [
-            10000000000.0,
-            10000000000.0,
-            10000000000.0,
-            999999999.9999999,
-            999999999.9999999,
+            10000000000.0, 10000000000.0, 10000000000.0, 999999999.9999999, 999999999.9999999,
             999999999.9999999,
         ],
-        jerk: [1000000000000.0, 1000000000000.0, 1000000000000.0, 100000000000.0, 100000000000.0, 100000000000.0],
+        jerk: [
+            1000000000000.0, 1000000000000.0, 1000000000000.0, 100000000000.0, 100000000000.0, 100000000000.0,
+        ],
     },
     stop: StopLimits {
         acceleration: [
-            15866666.666666664,
-            15866666.666666664,
-            15866666.666666664,
-            1586666.6666666663,
-            1586666.6666666663,
-            1586666.6666666663,
+            15866666.666666664, 15866666.666666664, 15866666.666666664, 1586666.6666666663,
+            1586666.6666666663, 1586666.6666666663,
         ],
         jerk: [
-            47203333.33333332,
-            47203333.33333332,
-            47203333.33333332,
-            4720333.33333333,
-            4720333.33333333,
+            47203333.33333332, 47203333.33333332, 47203333.33333332, 4720333.33333333, 4720333.33333333,
             4720333.33333333,
         ],
         shortest: 8,
     },
     stream_step: [
-        5.000000000000444e-7,
-        5.000000000000444e-7,
-        5.000000000000462e-7,
-        5.000000000000355e-6,
-        5.000000000000311e-6,
-        5.000000000000444e-6,
+        5.000000000000444e-7, 5.000000000000444e-7, 5.000000000000462e-7, 5.000000000000355e-6,
+        5.000000000000311e-6, 5.000000000000444e-6,
     ],
     stream_rate: [
-        0.005000000000000003,
-        0.005000000000000003,
-        0.005000000000000003,
-        0.050000000000000024,
-        0.050000000000000024,
-        0.050000000000000024,
+        0.005000000000000003, 0.005000000000000003, 0.005000000000000003, 0.050000000000000024,
+        0.050000000000000024, 0.050000000000000024,
     ],
     stream_acceleration: [50.0, 50.0, 50.0, 500.0, 500.0, 500.0],
     stale_ticks: 10,
@@ -82,7 +66,9 @@ pub(crate) static TRAJECTORIES: [Trajectory<Real>; 3] = [
         start: [0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
         segments: &SEGMENTS_0,
         ticks: 25000,
-        end: [1.0499999999999998e-5, 5.3579232956984425e-6, 3.9999999999999996e-5, 0.0, 0.0, 0.0],
+        end: [
+            1.0499999999999998e-5, 5.3579232956984425e-6, 3.9999999999999996e-5, 0.0, 0.0, 0.0,
+        ],
     },
     Trajectory::Segments {
         start: [0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
@@ -108,12 +94,42 @@ static SEGMENTS_0: [Segment<Real>; 2] = [
         phase_step: 0,
         angular: 0.0,
         axes: [
-            Axis { place: 0.0, slope: 2.4999999999999998e-6, sine: [0.0, 0.0], cosine: [0.0, 0.0] },
-            Axis { place: 0.0, slope: 2.4999999999999998e-6, sine: [0.0, 0.0], cosine: [0.0, 0.0] },
-            Axis { place: 0.0, slope: 8e-6, sine: [0.0, 0.0], cosine: [0.0, 0.0] },
-            Axis { place: 0.0, slope: 0.0, sine: [0.0, 0.0], cosine: [0.0, 0.0] },
-            Axis { place: 0.0, slope: 0.0, sine: [0.0, 0.0], cosine: [0.0, 0.0] },
-            Axis { place: 0.0, slope: 0.0, sine: [0.0, 0.0], cosine: [0.0, 0.0] },
+            Axis {
+                place: 0.0,
+                slope: 2.4999999999999998e-6,
+                sine: [0.0, 0.0],
+                cosine: [0.0, 0.0],
+            },
+            Axis {
+                place: 0.0,
+                slope: 2.4999999999999998e-6,
+                sine: [0.0, 0.0],
+                cosine: [0.0, 0.0],
+            },
+            Axis {
+                place: 0.0,
+                slope: 8e-6,
+                sine: [0.0, 0.0],
+                cosine: [0.0, 0.0],
+            },
+            Axis {
+                place: 0.0,
+                slope: 0.0,
+                sine: [0.0, 0.0],
+                cosine: [0.0, 0.0],
+            },
+            Axis {
+                place: 0.0,
+                slope: 0.0,
+                sine: [0.0, 0.0],
+                cosine: [0.0, 0.0],
+            },
+            Axis {
+                place: 0.0,
+                slope: 0.0,
+                sine: [0.0, 0.0],
+                cosine: [0.0, 0.0],
+            },
         ],
     },
     Segment {
@@ -124,17 +140,42 @@ static SEGMENTS_0: [Segment<Real>; 2] = [
         phase_step: 1844674407370955,
         angular: 6.283185307179586,
         axes: [
-            Axis { place: -4.5e-6, slope: 0.0, sine: [0.0, 0.0], cosine: [-6.999999999999999e-6, -8e-6] },
+            Axis {
+                place: -4.5e-6,
+                slope: 0.0,
+                sine: [0.0, 0.0],
+                cosine: [-6.999999999999999e-6, -8e-6],
+            },
             Axis {
                 place: 0.0,
                 slope: 0.0,
                 sine: [-6.5382091465521785e-6, -7.472239024631062e-6],
                 cosine: [-2.500364204659277e-6, -2.857559091039174e-6],
             },
-            Axis { place: 8e-6, slope: 3.2e-5, sine: [0.0, 0.0], cosine: [0.0, 0.0] },
-            Axis { place: 0.0, slope: 0.0, sine: [0.0, 0.0], cosine: [0.0, 0.0] },
-            Axis { place: 0.0, slope: 0.0, sine: [0.0, 0.0], cosine: [0.0, 0.0] },
-            Axis { place: 0.0, slope: 0.0, sine: [0.0, 0.0], cosine: [0.0, 0.0] },
+            Axis {
+                place: 8e-6,
+                slope: 3.2e-5,
+                sine: [0.0, 0.0],
+                cosine: [0.0, 0.0],
+            },
+            Axis {
+                place: 0.0,
+                slope: 0.0,
+                sine: [0.0, 0.0],
+                cosine: [0.0, 0.0],
+            },
+            Axis {
+                place: 0.0,
+                slope: 0.0,
+                sine: [0.0, 0.0],
+                cosine: [0.0, 0.0],
+            },
+            Axis {
+                place: 0.0,
+                slope: 0.0,
+                sine: [0.0, 0.0],
+                cosine: [0.0, 0.0],
+            },
         ],
     },
 ];
@@ -149,12 +190,42 @@ static SEGMENTS_1: [Segment<Real>; 2] = [
         phase_step: 0,
         angular: 0.0,
         axes: [
-            Axis { place: 0.0, slope: 0.0, sine: [0.0, 0.0], cosine: [0.0, 0.0] },
-            Axis { place: 0.0, slope: 0.0, sine: [0.0, 0.0], cosine: [0.0, 0.0] },
-            Axis { place: 0.0, slope: 8e-6, sine: [0.0, 0.0], cosine: [0.0, 0.0] },
-            Axis { place: 0.0, slope: 0.0, sine: [0.0, 0.0], cosine: [0.0, 0.0] },
-            Axis { place: 0.0, slope: 0.0, sine: [0.0, 0.0], cosine: [0.0, 0.0] },
-            Axis { place: 0.0, slope: 0.0, sine: [0.0, 0.0], cosine: [0.0, 0.0] },
+            Axis {
+                place: 0.0,
+                slope: 0.0,
+                sine: [0.0, 0.0],
+                cosine: [0.0, 0.0],
+            },
+            Axis {
+                place: 0.0,
+                slope: 0.0,
+                sine: [0.0, 0.0],
+                cosine: [0.0, 0.0],
+            },
+            Axis {
+                place: 0.0,
+                slope: 8e-6,
+                sine: [0.0, 0.0],
+                cosine: [0.0, 0.0],
+            },
+            Axis {
+                place: 0.0,
+                slope: 0.0,
+                sine: [0.0, 0.0],
+                cosine: [0.0, 0.0],
+            },
+            Axis {
+                place: 0.0,
+                slope: 0.0,
+                sine: [0.0, 0.0],
+                cosine: [0.0, 0.0],
+            },
+            Axis {
+                place: 0.0,
+                slope: 0.0,
+                sine: [0.0, 0.0],
+                cosine: [0.0, 0.0],
+            },
         ],
     },
     Segment {
@@ -165,12 +236,42 @@ static SEGMENTS_1: [Segment<Real>; 2] = [
         phase_step: 1844674407370955,
         angular: 6.283185307179586,
         axes: [
-            Axis { place: 0.0, slope: 0.0, sine: [0.0, 0.0], cosine: [0.0, 0.0] },
-            Axis { place: 0.0, slope: 0.0, sine: [0.0, 0.0], cosine: [0.0, 0.0] },
-            Axis { place: 8e-6, slope: 2.2857142857142855e-5, sine: [0.0, 0.0], cosine: [0.0, 0.0] },
-            Axis { place: 0.0, slope: 0.0, sine: [4.363323129985824e-5, 0.0], cosine: [0.0, 0.0] },
-            Axis { place: 4.363323129985824e-5, slope: 0.0, sine: [0.0, 0.0], cosine: [4.363323129985824e-5, 0.0] },
-            Axis { place: 0.0, slope: 0.0, sine: [0.0, 0.0], cosine: [0.0, 0.0] },
+            Axis {
+                place: 0.0,
+                slope: 0.0,
+                sine: [0.0, 0.0],
+                cosine: [0.0, 0.0],
+            },
+            Axis {
+                place: 0.0,
+                slope: 0.0,
+                sine: [0.0, 0.0],
+                cosine: [0.0, 0.0],
+            },
+            Axis {
+                place: 8e-6,
+                slope: 2.2857142857142855e-5,
+                sine: [0.0, 0.0],
+                cosine: [0.0, 0.0],
+            },
+            Axis {
+                place: 0.0,
+                slope: 0.0,
+                sine: [4.363323129985824e-5, 0.0],
+                cosine: [0.0, 0.0],
+            },
+            Axis {
+                place: 4.363323129985824e-5,
+                slope: 0.0,
+                sine: [0.0, 0.0],
+                cosine: [4.363323129985824e-5, 0.0],
+            },
+            Axis {
+                place: 0.0,
+                slope: 0.0,
+                sine: [0.0, 0.0],
+                cosine: [0.0, 0.0],
+            },
         ],
     },
 ];
@@ -185,12 +286,42 @@ static SEGMENTS_2: [Segment<Real>; 3] = [
         phase_step: 0,
         angular: 0.0,
         axes: [
-            Axis { place: 0.0, slope: 2.4999999999999998e-6, sine: [0.0, 0.0], cosine: [0.0, 0.0] },
-            Axis { place: 0.0, slope: 2.4999999999999998e-6, sine: [0.0, 0.0], cosine: [0.0, 0.0] },
-            Axis { place: 0.0, slope: 6e-6, sine: [0.0, 0.0], cosine: [0.0, 0.0] },
-            Axis { place: 0.0, slope: 0.0, sine: [0.0, 0.0], cosine: [0.0, 0.0] },
-            Axis { place: 0.0, slope: 0.0, sine: [0.0, 0.0], cosine: [0.0, 0.0] },
-            Axis { place: 0.0, slope: 0.0, sine: [0.0, 0.0], cosine: [0.0, 0.0] },
+            Axis {
+                place: 0.0,
+                slope: 2.4999999999999998e-6,
+                sine: [0.0, 0.0],
+                cosine: [0.0, 0.0],
+            },
+            Axis {
+                place: 0.0,
+                slope: 2.4999999999999998e-6,
+                sine: [0.0, 0.0],
+                cosine: [0.0, 0.0],
+            },
+            Axis {
+                place: 0.0,
+                slope: 6e-6,
+                sine: [0.0, 0.0],
+                cosine: [0.0, 0.0],
+            },
+            Axis {
+                place: 0.0,
+                slope: 0.0,
+                sine: [0.0, 0.0],
+                cosine: [0.0, 0.0],
+            },
+            Axis {
+                place: 0.0,
+                slope: 0.0,
+                sine: [0.0, 0.0],
+                cosine: [0.0, 0.0],
+            },
+            Axis {
+                place: 0.0,
+                slope: 0.0,
+                sine: [0.0, 0.0],
+                cosine: [0.0, 0.0],
+            },
         ],
     },
     Segment {
@@ -213,10 +344,30 @@ static SEGMENTS_2: [Segment<Real>; 3] = [
                 sine: [5.7999999999999995e-6, 3.2e-6],
                 cosine: [0.0, 0.0],
             },
-            Axis { place: 6e-6, slope: 2.4e-5, sine: [0.0, 0.0], cosine: [0.0, 0.0] },
-            Axis { place: 0.0, slope: 0.0, sine: [4.363323129985824e-5, 0.0], cosine: [0.0, 0.0] },
-            Axis { place: 4.363323129985824e-5, slope: 0.0, sine: [0.0, 0.0], cosine: [4.363323129985824e-5, 0.0] },
-            Axis { place: 0.0, slope: 0.0, sine: [2.181661564992912e-5, 0.0], cosine: [0.0, 0.0] },
+            Axis {
+                place: 6e-6,
+                slope: 2.4e-5,
+                sine: [0.0, 0.0],
+                cosine: [0.0, 0.0],
+            },
+            Axis {
+                place: 0.0,
+                slope: 0.0,
+                sine: [4.363323129985824e-5, 0.0],
+                cosine: [0.0, 0.0],
+            },
+            Axis {
+                place: 4.363323129985824e-5,
+                slope: 0.0,
+                sine: [0.0, 0.0],
+                cosine: [4.363323129985824e-5, 0.0],
+            },
+            Axis {
+                place: 0.0,
+                slope: 0.0,
+                sine: [2.181661564992912e-5, 0.0],
+                cosine: [0.0, 0.0],
+            },
         ],
     },
     Segment {
@@ -227,12 +378,42 @@ static SEGMENTS_2: [Segment<Real>; 3] = [
         phase_step: 0,
         angular: 0.0,
         axes: [
-            Axis { place: 2.4999999999999998e-6, slope: -2.4999999999999998e-6, sine: [0.0, 0.0], cosine: [0.0, 0.0] },
-            Axis { place: 2.4999999999999998e-6, slope: -2.4999999999999998e-6, sine: [0.0, 0.0], cosine: [0.0, 0.0] },
-            Axis { place: 2.9999999999999997e-5, slope: -2.9999999999999997e-5, sine: [0.0, 0.0], cosine: [0.0, 0.0] },
-            Axis { place: 0.0, slope: 0.0, sine: [0.0, 0.0], cosine: [0.0, 0.0] },
-            Axis { place: 0.0, slope: 0.0, sine: [0.0, 0.0], cosine: [0.0, 0.0] },
-            Axis { place: 0.0, slope: 0.0, sine: [0.0, 0.0], cosine: [0.0, 0.0] },
+            Axis {
+                place: 2.4999999999999998e-6,
+                slope: -2.4999999999999998e-6,
+                sine: [0.0, 0.0],
+                cosine: [0.0, 0.0],
+            },
+            Axis {
+                place: 2.4999999999999998e-6,
+                slope: -2.4999999999999998e-6,
+                sine: [0.0, 0.0],
+                cosine: [0.0, 0.0],
+            },
+            Axis {
+                place: 2.9999999999999997e-5,
+                slope: -2.9999999999999997e-5,
+                sine: [0.0, 0.0],
+                cosine: [0.0, 0.0],
+            },
+            Axis {
+                place: 0.0,
+                slope: 0.0,
+                sine: [0.0, 0.0],
+                cosine: [0.0, 0.0],
+            },
+            Axis {
+                place: 0.0,
+                slope: 0.0,
+                sine: [0.0, 0.0],
+                cosine: [0.0, 0.0],
+            },
+            Axis {
+                place: 0.0,
+                slope: 0.0,
+                sine: [0.0, 0.0],
+                cosine: [0.0, 0.0],
+            },
         ],
     },
 ];

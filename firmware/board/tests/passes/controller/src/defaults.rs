@@ -4,11 +4,11 @@
 
 //! The spec's settings: what `Config::new` holds.
 
-use crate::identity::Constants;
-use crate::{Real, limits};
 use specgen_law::platform::{Environment, Settings};
 use specgen_runtime::trigger::Line;
 use specgen_runtime::{CodeLimits, ControlMode, Gains, Interaction, Law};
+use crate::identity::Constants;
+use crate::{Real, limits};
 
 /// ρ̂ of a leg, m/V; from `actuator`. X = q̂/ρ̂ is the virtual drive of (AII.1); mode P takes the leg as linear: u = q/ρ̂.
 pub const LEG_GAIN: Real = 6.31e-7;
@@ -19,46 +19,37 @@ pub(crate) const DEFAULTS: Settings<Constants> = Settings {
     interaction: Interaction::Neglected,
     level_weight: 0.04831111264715217,
     drift_weight: 0.002125688956474695,
-    code_limits: CodeLimits { min: limits::CODES[0], max: limits::CODES[1], max_step: 1747 },
+    code_limits: CodeLimits {
+        min: limits::CODES[0],
+        max: limits::CODES[1],
+        max_step: 1747,
+    },
     gains: Gains {
         proportional: [
-            506773.52336956555,
-            506773.52336956526,
-            1986452.9532608693,
-            9932.264766304346,
-            9932.264766304348,
+            506773.52336956555, 506773.52336956526, 1986452.9532608693, 9932.264766304346, 9932.264766304348,
             9886.35923843263,
         ],
         integral: [
-            1836209458.057596,
-            1836209458.0575948,
-            7197581429.494045,
-            35987907.14747023,
-            35987907.147470236,
+            1836209458.057596, 1836209458.0575948, 7197581429.494045, 35987907.14747023, 35987907.147470236,
             35821576.11285991,
         ],
         derivative: [0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
     },
     position_gains: Gains {
         proportional: [
-            366143.87063451105,
-            366143.8706345109,
-            1435212.2587309778,
-            7176.06129365489,
-            7176.0612936548905,
+            366143.87063451105, 366143.8706345109, 1435212.2587309778, 7176.06129365489, 7176.0612936548905,
             7142.894549767574,
         ],
         integral: [
-            7959968000.679677,
-            7959968000.679673,
-            31201515496.85669,
-            156007577.48428345,
-            156007577.48428345,
+            7959968000.679677, 7959968000.679673, 31201515496.85669, 156007577.48428345, 156007577.48428345,
             155286532.44924772,
         ],
         derivative: [0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
     },
-    environment: Environment { stiffness: [0.0, 0.0, 0.0, 0.0, 0.0, 0.0], rest: [0.0, 0.0, 0.0, 0.0, 0.0, 0.0] },
+    environment: Environment {
+        stiffness: [0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+        rest: [0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+    },
     damps: [false, false],
     triggers: TRIGGERS,
 };
@@ -70,16 +61,18 @@ pub const LINES: usize = 1;
 pub const INPUT: bool = true;
 
 /// What each output shows.
-pub(crate) const TRIGGERS: [Line<Real>; LINES] = [Line {
-    kind: specgen_runtime::trigger::Kind::Motion,
-    axis: 0,
-    direction: specgen_runtime::trigger::Direction::Both,
-    start: 0.0,
-    stop: 0.0,
-    step: 0.0005,
-    hysteresis: 0.0,
-    first: 1,
-    every: 1,
-    last: 0,
-    width: 1,
-}];
+pub(crate) const TRIGGERS: [Line<Real>; LINES] = [
+    Line {
+        kind: specgen_runtime::trigger::Kind::Motion,
+        axis: 0,
+        direction: specgen_runtime::trigger::Direction::Both,
+        start: 0.0,
+        stop: 0.0,
+        step: 0.0005,
+        hysteresis: 0.0,
+        first: 1,
+        every: 1,
+        last: 0,
+        width: 1,
+    },
+];
