@@ -449,8 +449,8 @@ mod tests {
         LegPlant::new(&LegParameters {
             gain_um_per_v: 1.0,
             s2: 0.0,
-            play_thresholds_v: vec![0.0],
-            play_weights: vec![1.0],
+            play_thresholds_v: vec![0.0, 5.0],
+            play_weights: vec![1.0, 1.0],
             creep_weights: vec![0.0; 5],
             tau_amp_s: 0.0,
             fn_hz: 1e6,

@@ -64,7 +64,7 @@ impl Gaussian {
 }
 
 /// Uniform in [0, 1) with 53 bits.
-pub(crate) fn unit(rng: &mut impl Rng) -> f64 {
+pub fn unit(rng: &mut impl Rng) -> f64 {
     (rng.next_u64() >> 11) as f64 / (1_u64 << 53) as f64
 }
 

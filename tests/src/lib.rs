@@ -38,7 +38,7 @@ pub fn repository() -> PathBuf {
     here.parent().unwrap_or(here).to_owned()
 }
 
-/// A new folder of this process below `target/tests/scratch`, which the next complete test run empties. Used exclusively.
+/// A new folder of this process below `target/tests/scratch`, which the next complete test run empties. No other process writes there.
 ///
 /// # Panics
 /// If it cannot be created.

@@ -168,9 +168,12 @@ fn sums(
     let every = (record.time.len() - first).div_ceil(SAMPLES);
     let visit = |step: Step| match step {
         Step::Sample(branch, k, row) => {
-            let [fitted, scored] = &mut parts[fold_of[branch].unwrap_or(folds)];
+            let fold = fold_of[branch];
+            let [fitted, scored] = &mut parts[fold.unwrap_or(folds)];
             fitted.add(row, &[target[k]], weight(weighting, plane, record, k));
-            scored.add(row, &[target[k]], 1.0);
+            if fold.is_some() {
+                scored.add(row, &[target[k]], 1.0);
+            }
         }
         Step::End(branch) => parts[fold_of[branch].unwrap_or(folds)].iter_mut().for_each(Sums::close_branch),
     };

@@ -374,7 +374,7 @@ pub struct Integrity {
     pub crc: u32,
 }
 
-/// The name of a variant.
+/// The name of a variant, without its contents.
 fn in_lower_case<S: Serializer>(choice: &impl core::fmt::Debug, serializer: S) -> Result<S::Ok, S::Error> {
     let shown = format!("{choice:?}").to_lowercase();
     serializer.serialize_str(shown.split('(').next().unwrap_or(&shown))

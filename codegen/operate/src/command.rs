@@ -152,7 +152,7 @@ impl ModeRequest {
         let found = ControlMode::WORDS.iter().find(|(name, _)| *name == self.0 || kept.as_deref() == Some(*name));
         found
             .map(|(_, word)| u64::from(*word))
-            .ok_or_else(|| "mode P has no run-to-run law to keep: name one, such as pf-pcc".to_owned())
+            .ok_or_else(|| format!("mode P has no run-to-run law to keep: name one, such as {}-pcc", self.0))
     }
 }
 
@@ -447,6 +447,6 @@ mod tests {
     fn a_mode_keeps_the_law_that_is_not_named() {
         let word = |text, now| ModeRequest::parse(text).unwrap().word(now);
         assert_eq!([word("p", 6), word("f", 6), word("pf", 2), word("pf-pcc", 0)], [Ok(0), Ok(3), Ok(5), Ok(6)]);
-        assert!(word("f", 0).unwrap_err().contains("name one, such as pf-pcc"));
+        assert!(word("f", 0).unwrap_err().contains("name one, such as f-pcc"));
     }
 }

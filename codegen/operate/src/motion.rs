@@ -6,7 +6,7 @@ use specgen_runtime::setpoint::{Frames, Target, Tool, Work};
 const ROOM: f64 = 0.01;
 /// Tolerance for rounding, as a share of the stroke.
 const SLACK: f64 = 1e-9;
-/// Iterations of the inverse coordinates. Each reduces the residual by at least a factor of the angles, at most 0.3 rad.
+/// Iterations of the inverse coordinates. Each multiplies the residual by at most the largest angle, 0.3 rad.
 const PASSES: u32 = 60;
 /// Bisection steps for the end of a range.
 const HALVINGS: u32 = 60;

@@ -60,7 +60,7 @@ pub fn control_modes(design: &Design) -> Grid {
             "λ limit",
             "gain margin ×",
             "delay margin, ticks",
-            "settling time, ms",
+            "slowest time constant, ms",
             "least damped mode",
         ],
     );

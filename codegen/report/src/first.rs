@@ -220,7 +220,7 @@ fn margin_card(compiled: &Compilation, verdict: &Verdict, mode: u32) -> String {
             format!("; ζ {:.3} at {:.0}\u{2009}Hz", mode.damping_ratio, mode.frequency)
         });
         let text = format!("{:.0}\u{2009}ms, {}{least}", settling * 1e3, margins::short_name(law));
-        content += &text_row("settling time", &text, "none");
+        content += &text_row("slowest time constant", &text, "none");
     }
     let stable = design.margins.iter().filter(|one| one.spectral_radius < 1.0).count();
     let all = stable == design.margins.len();

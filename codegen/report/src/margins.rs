@@ -71,9 +71,9 @@ pub fn section(compiled: &Compilation, mode: u32, command: &str) -> Section {
     let worst = worst.map_or_else(String::new, |(law, limit)| format!(" (worst mode: {}, {limit:.2})", name(law)));
     let lead = own.map_or_else(String::new, |own| {
         format!(
-            "With {} the loop is stable up to {} times its gain and {} times the leg gain{worst}. {stable} of {} modes are stable, {}.",
+            "With {} the gain margin is {} and the leg-gain margin {}{worst}. {stable} of {} modes are stable, {}.",
             name(law),
-            or(own.gain_margin, "any number tested of"),
+            or(own.gain_margin, "above the tested range"),
             or(own.gain_ratio_limit, "more than 10"),
             design.margins.len(),
             if design.touching { "free and in contact with the declared work piece" } else { "free of contact" }

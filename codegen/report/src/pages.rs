@@ -89,7 +89,7 @@ struct Build {
 /// Writes the page and shows the verdict.
 ///
 /// # Errors
-/// The spec is refused or incomplete, a run fails, or a file cannot be written.
+/// The spec is refused or not ready, a run fails, or a file cannot be written.
 pub fn run(options: &Options, ui: &mut Ui) -> Result<(), Failure> {
     let mut compiled = match compile::compile(&options.spec) {
         Ok(compiled) => compiled,

@@ -74,7 +74,7 @@ struct Summary {
 /// Writes the workspace, builds and measures it as requested, and shows the verdict.
 ///
 /// # Errors
-/// The spec is refused or incomplete, the folder cannot be written, a build fails, or a budget is exceeded.
+/// The spec is refused or not ready, the folder cannot be written, a build fails, or a budget is exceeded.
 pub fn run(options: &Options, ui: &mut Ui) -> Result<(), Failure> {
     let spec = &options.spec;
     let set_up = if options.setup { target::provision::provision(&mut |step| ui.progress(step)).err() } else { None };

@@ -54,7 +54,7 @@ struct Ratio {
 /// Reports every finding about a spec, and the verdict; with further properties if `details`.
 ///
 /// # Errors
-/// The spec is refused or incomplete, or it has a warning and warnings are denied.
+/// The spec is refused or not ready, or it has a warning and warnings are denied.
 pub fn run(spec: &Path, details: bool, deny_warnings: bool, ui: &mut Ui) -> Result<(), Failure> {
     let compiled = spec_file::quietly(spec, ui)?;
     // Findings use the bounds. The search for actual errors takes longer and runs only if its result is shown.

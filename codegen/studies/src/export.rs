@@ -239,7 +239,8 @@ int32_t specgen_config_check(const uint64_t *words);
 int32_t specgen_config_load(specgen_config *config, const uint64_t *words);
 
 /* A supervised tick; the supervisor controls amplifiers and codes: SPECGEN_MACHINE_INPUT_WORDS words in,
-   SPECGEN_MACHINE_OUTPUT_WORDS out. Requests are edge-triggered. Only one thread at a time may step a machine. */
+   SPECGEN_MACHINE_OUTPUT_WORDS out. Arm and acknowledge are edge-triggered;
+   the other requests apply in every tick in which they are given. Only one thread at a time may step a machine. */
 void specgen_machine_reset(specgen_machine *machine);
 void specgen_machine_step(const specgen_config *config, specgen_machine *machine, const uint64_t *input, uint64_t *output);
 uint64_t specgen_machine_digest(const specgen_machine *machine);

@@ -81,9 +81,10 @@ pub fn over(target: &Target, used: &ImageUsage) -> Vec<String> {
             "stack" => ("bytes", &used.stack_by),
             _ => ("per tick", &used.instructions_by),
         };
+        let subject = if what == "instructions" { "instruction count is".to_owned() } else { format!("{what} uses") };
         let verb = if from.contains('.') { "allows" } else { "has" };
         over.push(format!(
-            "{what} uses {}{} {unit}, {from} {verb} {}: reduce it by {}{}",
+            "{subject} {}{} {unit}, {from} {verb} {}: reduce it by {}{}",
             if what == "RAM" && used.ram.is_none() { "at least " } else { "" },
             group(amount),
             group(most),
@@ -97,7 +98,7 @@ pub fn over(target: &Target, used: &ImageUsage) -> Vec<String> {
     over
 }
 
-/// `; most of it: load 1,761 (43 %), learn 437 (11 %)`.
+/// `; largest: load 1,761 (43 %), learn 437 (11 %)`.
 fn users(by: &[(String, u64)], whole: u64) -> String {
     let mut sorted: Vec<&(String, u64)> = by.iter().filter(|(_, amount)| *amount > 0).collect();
     sorted.sort_by(|a, b| (b.1, &a.0).cmp(&(a.1, &b.0)));
@@ -154,8 +155,10 @@ mod tests {
         target.budget.instructions = Some(4000);
         assert_eq!(
             over(&target, &used()),
-            ["instructions uses 4,107 per tick, target.budget.instructions allows 4,000: reduce it by 107; largest: \
-                 load 1,761 (43 %), learn 437 (11 %)"]
+            [
+                "instruction count is 4,107 per tick, target.budget.instructions allows 4,000: reduce it by 107; largest: \
+                 load 1,761 (43 %), learn 437 (11 %)"
+            ]
         );
         target.budget.flash = Some(59_999);
         let words = over(&target, &used()).join("\n");

@@ -83,9 +83,9 @@ impl RequestContext<'_, '_> {
         result
     }
 
-    /// Changes the command of the ticks, unless the host steps the machine or `order` refuses.
-    fn order(&mut self, mut order: impl FnMut(&mut Exchange) -> bool) -> Result<(), Refusal> {
-        let done = self.locked(false, |exchange, _| !exchange.in_lockstep() && order(exchange));
+    /// Changes the command of the ticks, unless the host steps the machine or `change` refuses.
+    fn change_command(&mut self, mut change: impl FnMut(&mut Exchange) -> bool) -> Result<(), Refusal> {
+        let done = self.locked(false, |exchange, _| !exchange.in_lockstep() && change(exchange));
         if done { Ok(()) } else { Err(Refusal::State) }
     }
 
@@ -132,9 +132,9 @@ fn idle_player(exchange: &mut Exchange) -> Result<&mut Player<'static, Real>, Re
 /// Functions with large stack frames are not inlined: only one of them is then on the stack at a time, and none while
 /// the reply is written.
 impl Backend for RequestContext<'_, '_> {
-    const PIECE: usize = 512;
+    const PIECE: usize = specgen_link::lockstep::PIECE;
 
-    fn heard(&mut self) {
+    fn host_alive(&mut self) {
         (self.with)(&mut |exchange, _| exchange.host_alive());
     }
 
@@ -180,14 +180,14 @@ impl Backend for RequestContext<'_, '_> {
     }
 
     fn supervise(&mut self, request: Wanted) -> Result<(), Refusal> {
-        self.order(|exchange| {
+        self.change_command(|exchange| {
             exchange.orders.request = request;
             true
         })
     }
 
     fn command(&mut self, command: &Command) -> Result<(), Refusal> {
-        self.order(|exchange| {
+        self.change_command(|exchange| {
             // A command from before the run must not take effect later.
             let free = !exchange.is_engaged() && exchange.report.phase == Phase::Running;
             if free {
@@ -262,7 +262,7 @@ impl Backend for RequestContext<'_, '_> {
             return self.wait_for_edge(EdgeCommand::Wave, Some(wave));
         }
         wave.start();
-        self.order(|exchange| {
+        self.change_command(|exchange| {
             let (status, command) = (exchange.report.status, &exchange.orders.command);
             let may = exchange.report.phase == Phase::Running
                 && !exchange.is_engaged()
@@ -276,7 +276,7 @@ impl Backend for RequestContext<'_, '_> {
     }
 
     fn stop_wave(&mut self) -> Result<(), Refusal> {
-        self.order(|exchange| {
+        self.change_command(|exchange| {
             exchange.cancel_awaited();
             if let Some(wave) = &mut exchange.wave {
                 wave.stop();

@@ -17,15 +17,15 @@ use crate::samples;
 /// Input words of the controller, without the measured ones.
 pub type Command = [u64; COMMAND_WORDS];
 
-/// Gives samples and takes commands: a board, or the program of a PC.
+/// Carries out the requests of hosts: a board, or the program of a PC.
 pub trait Backend {
     /// Most bytes of a piece of the description.
     const PIECE: usize;
 
     /// A host sent a request.
-    fn heard(&mut self);
+    fn host_alive(&mut self);
 
-    /// A host opens a session: requests of the last one end. Returns the unit of the costs of its ticks.
+    /// A host opens a session. On a board this ends what the last session requested. Returns the unit of the costs of its ticks.
     fn connect(&mut self) -> CostUnit;
 
     /// Its status; the counters of the link are left out.
@@ -40,7 +40,7 @@ pub trait Backend {
     /// Room for the words of an answer.
     fn buffer(&mut self) -> &mut [u8];
 
-    /// Gives control to the host, if another one may be in control.
+    /// Takes control for the host that sent the request, or refuses it. A board has only one host.
     fn authorise(&mut self) -> Result<(), Refusal> {
         Ok(())
     }
@@ -94,13 +94,13 @@ pub trait Backend {
     /// The oldest block of samples.
     fn samples(&mut self) -> Reply<'_>;
 
-    /// [`Request::Stop`] and lock-steps.
+    /// Carries out [`Request::Stop`] and the requests of lock-steps.
     fn other(&mut self, request: &Request<'_>) -> Reply<'_>;
 }
 
 /// Carries out a request on a backend.
 pub fn execute<'b>(backend: &'b mut impl Backend, request: &Request<'_>) -> Reply<'b> {
-    backend.heard();
+    backend.host_alive();
     answer(backend, request).unwrap_or_else(Reply::Refused)
 }
 
@@ -173,12 +173,12 @@ fn supervise(backend: &mut impl Backend, request: u8) -> Result<(), Refusal> {
 fn command<B: Backend>(
     backend: &mut B,
     words: Bytes<'_>,
-    order: impl Fn(&mut B, &Command) -> Result<(), Refusal>,
+    set: impl Fn(&mut B, &Command) -> Result<(), Refusal>,
 ) -> Result<(), Refusal> {
     backend.authorise()?;
     let mut command = [0; COMMAND_WORDS];
     read(words, &mut command)?;
-    order(backend, &command)
+    set(backend, &command)
 }
 
 #[inline(never)]

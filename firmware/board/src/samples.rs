@@ -1,5 +1,7 @@
 //! Samples for a subscribed host: a tick stores a copy of its results, the background makes rows of the copies.
 
+use core::mem::MaybeUninit;
+
 use controller::limits::DAC;
 use controller::supervised::{Machine, MachineOutput};
 use controller::{LEGS, PLACE_WORDS, Real, passes};
@@ -54,11 +56,11 @@ pub fn sample(tick: u64, status: u32, phase: u8, shown: [[Real; AXES]; 2], volts
 /// Memory for samples, 6 KiB. It need not be initialised.
 #[derive(Debug)]
 pub struct SampleMemory {
-    copies: Copies,
+    copies: MaybeUninit<Copies>,
     rows: Rows,
 }
 
-/// A queue holds one less than its size. Every bit pattern is one, so that its memory need not be initialised.
+/// A queue holds one item less than its size.
 type Copies = Queue<TickSample, { COPIES + 1 }>;
 pub(crate) type Rows = Collector<[Block; BLOCKS]>;
 
@@ -69,10 +71,10 @@ impl Default for SampleMemory {
 }
 
 impl SampleMemory {
-    /// Zeros.
+    /// Copies that are not initialised, and empty blocks.
     #[must_use]
     pub const fn new() -> Self {
-        Self { copies: Queue::new(), rows: Collector::new([Block::EMPTY; BLOCKS]) }
+        Self { copies: MaybeUninit::uninit(), rows: Collector::new([Block::EMPTY; BLOCKS]) }
     }
 }
 
@@ -93,7 +95,7 @@ pub(crate) struct Samples {
 impl Samples {
     pub(crate) fn new(memory: &'static mut SampleMemory, baud: u32) -> Self {
         let SampleMemory { copies, rows } = memory;
-        *copies = Queue::new();
+        let copies = copies.write(Queue::new());
         Self { every: 0, anew: true, copies, rows: Some(rows), baud }
     }
 

@@ -148,7 +148,7 @@ impl<M: Machine> Lockstep<M> {
 }
 
 /// Bytes of text in one answer.
-const PIECE: usize = 512;
+pub const PIECE: usize = 512;
 
 impl<M: Machine> Device for Lockstep<M> {
     fn execute(&mut self, request: &Request<'_>) -> Reply<'_> {

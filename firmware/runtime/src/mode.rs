@@ -5,7 +5,7 @@ use core::fmt;
 use crate::adaptation::Law;
 use crate::choice::{Choice, choice};
 
-/// Control mode of section 4. Its capabilities are the first four methods below.
+/// Control mode of section 4. Its capabilities: `feeds_back`, `own_gains`, `inverts`, `damps_modes`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ControlMode {
     /// P: position tracking (7) on a linear leg, u = q/ρ̂; no hysteresis model, no adaptation.

@@ -39,19 +39,14 @@ fn main() {
     let mut rig = PlatformRig::new(&specimen, &Noise::of(&specimen), 1);
     rig.prepare(&Preparation { peak: 100.0, rate: 200.0, settle: 0.2, update: 5e-5, rest: 0.0 });
     let start = Instant::now();
-    // Legs with different voltages are computed one by one.
-    for (what, peak) in [("legs side by side", 100.0), ("one by one", 99.0)] {
-        let mut specimen = specimen.clone();
-        specimen.legs[5].u_max = peak;
-        let mut best = f64::INFINITY;
-        for _ in 0..5 {
-            let mut rig = PlatformRig::new(&specimen, &Noise::NONE, 1);
-            let begun = processor_time(start);
-            rig.prepare(&Preparation::of(&specimen.legs[0], 0.0));
-            best = f64::min(best, processor_time(start) - begun);
-        }
-        println!("pre-cycle, {what}: {:.1} ms", best * 1e3);
+    let mut best = f64::INFINITY;
+    for _ in 0..5 {
+        let mut rig = PlatformRig::new(&specimen, &Noise::NONE, 1);
+        let begun = processor_time(start);
+        rig.prepare(&Preparation::of(&specimen.legs[0], 0.0));
+        best = f64::min(best, processor_time(start) - begun);
     }
+    println!("pre-cycle: {:.1} ms", best * 1e3);
     let voltages = |tick: usize| std::array::from_fn(|leg| 40.0 + 0.01 * ((tick * (leg + 3)) % 500) as f64);
     for whole in [false, true] {
         let mut rig = rig.clone();

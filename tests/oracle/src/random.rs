@@ -1,9 +1,10 @@
 //! Random numbers and machines for tests.
 
+use host_sim::noise::unit;
 use host_sim::plant::LegParameters;
 use host_sim::platform::{PlatformParameters, Specimen};
 use rand_chacha::ChaCha8Rng;
-use rand_chacha::rand_core::{Rng, SeedableRng};
+use rand_chacha::rand_core::SeedableRng;
 
 /// Range of the nominal axial stiffness of random plants, relative to the parameter file's.
 const STIFFNESS_RANGE: [f64; 2] = [0.7, 1.4];
@@ -13,11 +14,6 @@ const DAMPING_RANGE: [f64; 2] = [0.01, 0.05];
 
 /// Stream of random numbers, apart from those of a machine.
 const NOMINAL_STREAM: u64 = 2 << 32;
-
-/// Uniform in [0, 1) with 53 bits.
-pub(crate) fn unit(rng: &mut impl Rng) -> f64 {
-    (rng.next_u64() >> 11) as f64 / (1_u64 << 53) as f64
-}
 
 /// Random machine `number` of `seed`: nominal stiffness 0.7 to 1.4 times the reference platform's, damping ratio 1
 /// to 5 %, and tolerances as usual.

@@ -194,7 +194,7 @@ fn no_start_rule_is_unstable_on_any_machine() {
                 let position = &bench.design().position;
                 let setting = Setting { mode, tuning: &tuning, position, latency: 0 };
                 if !settles(&bench.specimen, &mut controller, &setting) {
-                    bad.push(format!("machine {number}, {base}, {}", law));
+                    bad.push(format!("machine {number}, {base}, {law}"));
                 }
             }
         }

@@ -394,7 +394,7 @@ fn vibration_blames_no_gauge_or_leg() {
     let emitted = Emitted::new("supervisor-wiring", "reference.toml", &[]);
     let compiled = &emitted.compiled;
     let mut supervised = Supervised::new(emitted.at_run_time());
-    let (machines, amplitudes) = specgen_tests::length((4, &[(20e-9, 3)][..]), (26, &[(20e-9, 8), (40e-9, 20)]));
+    let (machines, amplitudes) = specgen_tests::length((4, &[(20e-9, 2)][..]), (26, &[(20e-9, 8), (40e-9, 20)]));
     for &(amplitude, most) in amplitudes {
         let mut refused = 0;
         for number in 0..machines {

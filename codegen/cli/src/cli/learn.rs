@@ -28,7 +28,8 @@ pub struct Arguments {
     /// Its operating frequency, Hz; 10, or that of the spec, if not given.
     #[arg(long, value_name = "HZ", value_parser = frequency, allow_negative_numbers = true)]
     frequency: Option<f64>,
-    /// Largest number of learning passes; one more pass measures the result. Learning ends early when the gain of a pass is within its noise.
+    /// Largest number of learning passes; one more pass measures the result. Learning ends early when the improvement of a pass
+    /// is within its noise.
     #[arg(long, value_name = "N", default_value_t = 5, allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(0..=1000))]
     passes: u32,
     /// Highest frequency to learn, Hz; lowered until every machine within [robust] converges.
@@ -55,7 +56,7 @@ pub struct Arguments {
     #[arg(long, value_name = "KNOTS", num_args = 0..=1, default_missing_value = "4096", conflicts_with_all = ["excite", "response"],
           value_parser = clap::value_parser!(u32).range(1..=1 << 20))]
     on_device: Option<u32>,
-    /// Write the resulting correction to this file (JSON): that of the last pass whose gain exceeded its noise.
+    /// Write the resulting correction to this file (JSON): that of the last pass whose improvement exceeded its noise.
     #[arg(short, long, value_name = "FILE")]
     output: Option<OutputFile>,
     /// Learn on this machine: it is armed first and ramped down afterwards.

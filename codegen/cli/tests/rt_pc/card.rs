@@ -102,7 +102,7 @@ fn follows(bench: &Bench) -> String {
 
 /// Starts it repeatedly until it runs: arming tolerates no missed ticks, which an ordinary computer has.
 fn comes_to_run(command: &mut std::process::Command, link: &Path) -> (ProcessGuard, Host) {
-    for _ in 0..50 {
+    for _ in 0..200 {
         // A socket of an earlier program may exist without a listener.
         let _ = fs::remove_file(link);
         let running = ProcessGuard::new(command);

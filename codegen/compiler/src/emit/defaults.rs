@@ -63,7 +63,7 @@ fn platform(ir: &Ir, d: &PlatformDefaults) -> (TokenStream, TokenStream) {
     let real = |value| literal::real(ir.scalar, value);
     let six = |values: &[f64; 6]| literal::reals(ir.scalar, values);
     let (law, mode, interaction) = (variant(&d.law), variant(&d.mode), variant(&d.interaction));
-    let has_law = format!("{:?}", d.mode).contains('(');
+    let has_law = d.mode != specgen_runtime::ControlMode::P;
     let with_law = has_law.then(|| quote! { (Law::#law) });
     let import_law = has_law.then(|| quote! { , Law });
     let gains = |of: &Gains| literal::constant!(ir.scalar, gains, of);

@@ -38,8 +38,8 @@ lints! {
 
     /// # W0871: a budget that has no effect
     ///
-    /// A budget should not be hundreds of times the size of the tables, and the time of
-    /// a tick not longer than the period.
+    /// A budget should not be hundreds of times the size of the tables, and the
+    /// time of a tick should not exceed the period.
     ///
     /// ## Why it matters
     ///

@@ -134,7 +134,7 @@ lints! {
     ///
     /// ## Why it matters
     ///
-    /// The platform dithers between two codes by that much. 16 bits are usual.
+    /// The platform hunts between two codes by that much. 16 bits are usual.
     ///
     /// ## Example
     ///

@@ -129,7 +129,7 @@ lints! {
     ///
     /// ## Why it matters
     ///
-    /// It is usually um or m written for mm. The lever arm of the gauge about that axis
+    /// It is usually um written for mm. The lever arm of the gauge about that axis
     /// would vanish.
     ///
     /// ## Example
@@ -219,7 +219,7 @@ lints! {
     ///
     /// ## Why it matters
     ///
-    /// Feedback cannot do better than one step; the platform dithers within it.
+    /// Feedback cannot do better than one step; the platform hunts within it.
     ///
     /// ## Example
     ///

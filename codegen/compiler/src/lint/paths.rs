@@ -166,7 +166,7 @@ lints! {
     PATH_EXCITES = "W0854";
 }
 
-/// Ratio of mean to local gain of a stack, at most.
+/// Largest ratio between the local and the mean gain of a stack, in either direction.
 const GAIN_SLACK: f64 = 1.3;
 /// Largest deflection by inertia, as a share of the stroke.
 const LARGEST_DEFLECTION: f64 = 0.1;

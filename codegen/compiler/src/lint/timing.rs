@@ -393,7 +393,7 @@ fn modes_seen_as_others(facts: &Facts, found: &mut Findings) {
         MODE_ALIASED,
         "timing.period",
         format!(
-            "the platform's mode at {} Hz is above half the tick rate, {} Hz: it is aliased to {} Hz with {} of its amplitude",
+            "the platform's mode at {} Hz is above half the tick rate, {} Hz: it is aliased to {} Hz with {} times its amplitude",
             figure(*mode),
             figure(0.5 / tick),
             figure(alias),

@@ -161,6 +161,8 @@ fn drift_behind_level(facts: &Facts, found: &mut Findings) {
         DRIFT_ODD,
         &key,
         format!("the drift estimate, at {} rad/s, {how} the level estimate, at {} rad/s", figure(drift), figure(level)),
-        &format!("the paper uses a twentieth: check the units of `{key}` and `{level_key}`, or if they are swapped"),
+        &format!(
+            "the paper uses a twentieth: check the units of `{key}` and `{level_key}`, and whether they are swapped"
+        ),
     );
 }

@@ -12,7 +12,7 @@ use crate::regressor::Plane;
 use specgen_language::interrupt;
 use specgen_numerics::nnls::{self, Failure};
 
-/// Over the branches of `p`, each with a free offset, as shares of its samples: the weights of Γ₀, then with `rate_unit`
+/// Normal equations over the branches of `p`, each with a free offset, as shares of its samples: the weights of Γ₀, then with `rate_unit`
 /// those of Γ₁, with rates in this unit (V/s). `targets` are over the used part (m).
 pub(super) fn accumulate(plane: &Plane, p: &PreparedRecord, targets: &[Vec<f64>], rate_unit: Option<f64>) -> Normal {
     let unknowns = if rate_unit.is_some() { 2 * plane.nodes() } else { plane.nodes() };

@@ -31,12 +31,12 @@ impl From<ClientError> for SessionError {
     }
 }
 
-/// The error of `stop`: a board cannot be stopped.
+/// The error of `stop`: the program of a board cannot be ended.
 pub(super) fn unsupported(error: ClientError) -> SessionError {
     match error {
-        ClientError::Refused(Refusal::Unsupported) => {
-            SessionError::Refused("a board cannot be stopped; `ramp-down` switches its amplifiers off".to_owned())
-        }
+        ClientError::Refused(Refusal::Unsupported) => SessionError::Refused(
+            "the program of a board cannot be ended; `ramp-down` switches its amplifiers off".to_owned(),
+        ),
         other => other.into(),
     }
 }

@@ -223,7 +223,7 @@ fn shown(path: &Path) -> String {
 fn refused(error: ClientError) -> SessionError {
     match error {
         ClientError::Refused(Refusal::Unsupported) => SessionError::Refused(
-            "the device takes no correction; write correction = \"<number> um\" in [control] of its spec, then build and flash it"
+            "the device takes no correction; write correction = \"<number> um\" in [control] of its spec, then rebuild and install it"
                 .to_owned(),
         ),
         ClientError::Refused(Refusal::State) => SessionError::Refused(

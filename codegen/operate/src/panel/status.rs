@@ -130,7 +130,7 @@ pub fn message(status: &Status, rules: &Supervision, model: &Model) -> StatusMes
             let (kind, what, advice) = if of != Cause::None {
                 return message("error", &format!("Running. {what}"), advice);
             } else if bits & REFUSED != 0 {
-                ("warning", "Running. The last command was refused.", "Hold, run, and move within the reach.")
+                ("warning", "Running. The last command was refused.", "Hold, run, and move within reach.")
             } else if bits & STALE != 0 {
                 ("warning", "Running. The stream of set-points has stopped.", "Move, or send set-points.")
             } else if bits & GAUGES != 0 {

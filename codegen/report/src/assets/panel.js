@@ -204,7 +204,7 @@
     if (!link) blank();
     if (ended) put("error", "The panel was stopped.", ended);
     else if (!link) put("error", "No link to the panel.", "Use the hardware stop if the machine must stop.", state ? "" : "connecting");
-    else if (left) put("warning", "The controlling page was closed.", "The machine holds" + (left.left > 0 ? ", and ramps down in " + left.left.toFixed(0) + "\u2009s" : " or is at rest") + ". Hold, Ramp down and Request control work from here.");
+    else if (left) put("warning", "The controlling page is gone.", "The machine holds" + (left.left > 0 ? ", and ramps down in " + left.left.toFixed(0) + "\u2009s" : " or is at rest") + ". Hold, Ramp down and Request control work from here.");
     else if (age > STALE) put("error", "No data for " + (isFinite(age) ? duration(age / 1000) : "any time") + ".", "Readouts are blank until data arrive.");
     else if (state) {
       const said = state.said, watch = !state.mine && state.holder;

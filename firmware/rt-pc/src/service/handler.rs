@@ -78,7 +78,7 @@ impl<'a> LinkHandler<'a> {
 impl Backend for LinkHandler<'_> {
     const PIECE: usize = CHUNK;
 
-    fn heard(&mut self) {
+    fn host_alive(&mut self) {
         self.console.operator.seen(self.host, self.now);
     }
 

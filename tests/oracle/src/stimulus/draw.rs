@@ -3,7 +3,7 @@
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 
-use crate::random::unit;
+use host_sim::noise::unit;
 use host_sim::word::Scalar;
 
 /// In a stretch of special numbers, one word in this many is special.

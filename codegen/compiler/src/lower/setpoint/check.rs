@@ -70,7 +70,7 @@ impl Excesses {
         let place = self.place.map(|worst| {
             let axis = worst.axis;
             let message = format!(
-                "{} is {} after {:.6} s, outside the workspace of ±{}, which includes the bias",
+                "{} is {} after {:.6} s, bias included, outside the workspace of ±{}",
                 AXES[axis],
                 amount(axis, worst.value),
                 worst.time,

@@ -30,9 +30,9 @@ const STIFFNESS: [f64; 2] = [0.9, 1.1];
 const RATIO: [f64; 2] = [0.9, 1.1];
 const DELAY: [f64; 2] = [0.0, 1.0];
 const LAG: [f64; 2] = [0.7, 1.3];
-/// Stiffness under which the loop must only be stable.
+/// Stiffness over a wider range, with a looser target of |S|.
 const WIDE: [f64; 2] = [0.6, 1.6];
-/// Target of the largest |S|: nominal, and over the conditions.
+/// Target of the largest |S|: over the design conditions, and over [`WIDE`].
 const SENSITIVITY: f64 = 1.95;
 const WIDE_SENSITIVITY: f64 = 4.0;
 /// Target of the compliance peak, relative to that without feedback.
