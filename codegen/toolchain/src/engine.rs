@@ -12,7 +12,7 @@ const VARIABLE: &str = "SPECGEN_UNICORN";
 /// The system's library folders are below this one, one per architecture.
 const USUAL: &str = "/usr/lib";
 
-/// The library from [`VARIABLE`], the system's folders, or the unpacked packages.
+/// The library from `SPECGEN_UNICORN`, the system's folders, or the unpacked packages.
 ///
 /// # Errors
 /// [`TargetError::MissingTool`] with the command that installs it.

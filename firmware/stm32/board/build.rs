@@ -18,7 +18,7 @@ fn main() {
         && value("core").is_some_and(|core| flags.contains(&format!("target-cpu={core}")))
         && var("PROFILE").is_ok_and(|profile| profile == "release");
     if !is_meant {
-        let target = root.file_name().unwrap_or_default().display();
+        let target = root.file_name().unwrap_or_default().to_string_lossy();
         eprintln!(
             "error: this would compute floating-point numbers in software, or without optimisation: no tick would be in time\n\
              = help: `specgen build SPEC --target {target}`, or in this folder, whose .cargo/config.toml says the rest:\n        \

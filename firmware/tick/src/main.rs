@@ -111,7 +111,7 @@ fn run() -> Result<(), Exit> {
             *slot = word;
         }
         timed.exchange.host_alive();
-        if ticks % SETTINGS_EVERY == 0 {
+        if ticks.is_multiple_of(SETTINGS_EVERY) {
             timed.exchange.next = Some(timed.settings);
         }
         if passes::POSSIBLE && !timed.player.is_running() {

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::bound::Bound;
 
-/// Parameters of a [`BoucWen`].
+/// Parameters of a Bouc-Wen leg.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct BoucWenParameters {
