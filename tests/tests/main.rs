@@ -54,6 +54,7 @@ mod spec_fuzz;
 mod spec_platform;
 mod spec_schema;
 mod spec_slips;
+mod spec_structure;
 mod stability_refusal;
 mod supervisor;
 mod support;

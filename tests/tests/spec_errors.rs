@@ -202,6 +202,7 @@ fn line_with(key: &Key, index: usize, literal: &str) -> String {
         // What is more than the example has stands before it, as zero if it may be.
         Shape::Leading(_, items) => {
             let filler = |item: &Item| match item {
+                Item::Choice(words) => format!("\"{}\"", words[0]),
                 Item::Quantity { unit, range, .. } => {
                     format!("\"{} {unit}\"", if range.contains(0.0) { 0 } else { 1 })
                 }

@@ -150,11 +150,16 @@ fn too_many_of_anything_are_refused() {
     let path = |i: usize| format!("[[trajectory]]\nname = \"t{i}\"\nkind = \"case-1\"\nfrequency = \"1 Hz\"\n");
     let many: String = (0..29).map(path).collect();
     let enough: String = (0..200).map(path).collect();
+    let mode =
+        |i: usize| format!("[[mode]]\nfrequency = \"{} Hz\"\ndamping_ratio = 0.1\nat = \"leg\"\n", 1000 + 90 * i);
+    let [modes, many_modes]: [String; 2] = [32, 33].map(|count| (0..count).map(mode).collect());
     for (more, expected) in [
         (gauge.to_owned(), vec![(codes::GAUGE_COUNT.id, "gauge[6]")]),
         (gauge.repeat(100), vec![(codes::GAUGE_COUNT.id, "gauge[6]")]),
         (many, Vec::new()),
         (enough, vec![(codes::TOO_MANY_TRAJECTORIES.id, "trajectory")]),
+        (modes, Vec::new()),
+        (many_modes, vec![(codes::TOO_MANY_MODES.id, "mode")]),
         (
             "[[trajectory]]\n".to_owned(),
             vec![(codes::MISSING_KEY.id, "trajectory[3].name"), (codes::MISSING_KEY.id, "trajectory[3].kind")],

@@ -8,6 +8,7 @@ mod hysteresis;
 pub(crate) mod joints;
 mod mcu;
 mod mechanics;
+pub(crate) mod structure;
 mod supervisor;
 mod target;
 mod task_space;
@@ -23,12 +24,13 @@ pub use electronics::{Actuator, Amplifier, Dac, Sensor};
 pub use hysteresis::{Adaptation, AdaptationMode, Hysteresis, LARGEST_RUN_INTERVAL, MAX_GRID, RateDependence};
 pub use mcu::{BOARDS, Mcu, Part};
 pub use mechanics::{Geometry, LARGEST_TRAVEL, LARGEST_TURN, LegBody, RigidBody, Workspace};
+pub use structure::{StructuralKind, StructuralMode, StructuralUncertainty};
 pub use supervisor::{FaultAction, LARGEST_PULSE, LONGEST_TIMEOUT, LegMakes, Robust, Supervisor, WiringCheck};
 pub use target::{Budget, ControllerOptions, Lint, Requirements, Scalar, SetpointKind, Target, Timing, TrackingLimit};
 pub(crate) use task_space::unit;
 pub use task_space::{
     ControlMode, DynamicsChoice, Environment, Frames, Gains, Interaction, LARGEST_GAIN, PaperPath, Probe,
-    SetpointRules, TaskSpace, Trajectory, TrajectoryKind,
+    SetpointRules, StoredDesign, TaskSpace, Trajectory, TrajectoryKind,
 };
 pub use trigger::{MAX_OUTPUTS, Trigger, TriggerDirection, TriggerKind};
 
@@ -48,11 +50,13 @@ pub static SECTIONS: &[Section] = &[
     Environment::SECTION,
     SetpointRules::SECTION,
     Frames::SECTION,
+    StoredDesign::SECTION,
     Gains::SECTION,
     Gains::OF_POSITION,
     Probe::SECTION,
     Trajectory::SECTION,
     Trigger::SECTION,
+    StructuralMode::SECTION,
     Timing::SECTION,
     Workspace::SECTION,
     ControllerOptions::SECTION,
@@ -63,6 +67,7 @@ pub static SECTIONS: &[Section] = &[
     Target::SECTION,
     Budget::SECTION,
     Robust::SECTION,
+    StructuralUncertainty::SECTION,
     Lint::SECTION,
 ];
 
@@ -144,6 +149,10 @@ pub struct Model {
     pub supervisor: Supervisor,
     /// What `specgen robust` varies, and its gate; no constant of the controller comes from here.
     pub robust: Robust,
+    /// Known modes of the structure, in the order of the spec; none without `task_space`.
+    pub structural_modes: Vec<StructuralMode>,
+    /// Modes of the structure that the spec does not list.
+    pub structure: StructuralUncertainty,
     /// Exceptions from the physical lint, with reasons.
     pub lint: Lint,
     /// Place of each key in the spec file, by key path (`actuator.voltage[1]`), for findings of later phases.
@@ -175,6 +184,13 @@ impl Model {
             requirements: Requirements::read(fields, "requirements")?,
             supervisor: Supervisor::read(fields, "supervisor")?,
             robust: Robust::read(fields, "robust")?,
+            structural_modes: (0..fields.count("mode"))
+                .map(|index| StructuralMode::read(fields, &format!("mode[{index}]")))
+                .collect::<Option<_>>()?,
+            structure: match fields.table("robust.structure") {
+                Some(_) => StructuralUncertainty::read(fields, "robust.structure")?,
+                None => StructuralUncertainty::assumed(),
+            },
             lint: Lint::read(fields, "lint").unwrap_or(Lint { allow: Vec::new() }),
             spans: fields.spans(),
         })

@@ -13,6 +13,7 @@
 //! | [`Factor`] | Cholesky factors of large matrices, by blocks |
 //! | [`nnls`] | non-negative least squares: the weights of a hysteresis table |
 //! | [`largest`], [`simplex`] | where a condition ceases to hold, by bisection; where a cost is least |
+//! | [`Cma`] | global search for the least cost |
 //! | [`Resolvent`] | what a sampled system answers at each frequency |
 //! | [`steady_covariances`] | what white noise makes of the states of a sampled system |
 //! | [`fft`] | Fourier transforms |
@@ -22,6 +23,7 @@
 //! A separate crate because it is optimised for speed, which the rest of the compiler is not.
 
 mod cholesky;
+mod cma;
 mod covariance;
 mod double;
 mod eigenvalues;
@@ -41,6 +43,7 @@ mod taylor;
 mod traced;
 
 pub use cholesky::Factor;
+pub use cma::{Cma, ranked, unit_interval};
 pub use covariance::steady_covariances;
 pub use double::Double;
 pub use eigenvalues::{eigenvalues, spectral_radius};

@@ -63,10 +63,172 @@ pub fn sensitivity(
     turns == 0 && last[0] > 0.0
 }
 
+/// Where a structural mode acts on a loop.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Flexure {
+    /// In series with the actuator: factor H = 1/(1 − r² + 2jζr), r = f/f_n.
+    Series,
+    /// On the sensor, with this participation a: factor 1 + a r² H.
+    Sensor(f64),
+}
+
+impl Flexure {
+    /// The factor at `ratio` r.
+    #[inline]
+    #[must_use]
+    pub fn factor(self, ratio: f64, damping_ratio: f64) -> Complex {
+        let below = [1.0 - ratio * ratio, 2.0 * damping_ratio * ratio];
+        match self {
+            Self::Series => over([1.0, 0.0], below),
+            Self::Sensor(share) => plus([1.0, 0.0], over([share * ratio * ratio, 0.0], below)),
+        }
+    }
+
+    /// f_n/f and ζ of the mode with which 1 + L·factor = δ at frequency f, for a loop L without the mode; none if there is no
+    /// such mode. δ = 0 gives the border of stability: below that ζ the loop with the mode is unstable.
+    ///
+    /// ```text
+    /// series   L' = L/(1 − δ)       f_n = f/√(1 + Re L')       ζ = −Im L'/(2 √(1 + Re L'))
+    /// sensor   T' = L/(1 + L − δ)   f_n = f √(1 − a Re T')     ζ = −a Im T'/(2 √(1 − a Re T'))
+    /// ```
+    #[inline]
+    #[must_use]
+    pub fn border(self, loop_gain: Complex, distance: Complex) -> Option<[f64; 2]> {
+        let (square, imaginary) = match self {
+            Self::Series => {
+                let [re, im] = over(loop_gain, [1.0 - distance[0], -distance[1]]);
+                (1.0 + re, im)
+            }
+            Self::Sensor(share) => {
+                let below = [1.0 + loop_gain[0] - distance[0], loop_gain[1] - distance[1]];
+                let [re, im] = over(loop_gain, below);
+                (1.0 - share * re, share * im)
+            }
+        };
+        let root = libm::sqrt(square);
+        let ratio = match self {
+            Self::Series => 1.0 / root,
+            Self::Sensor(_) => root,
+        };
+        (square > 0.0).then_some([ratio, -0.5 * imaginary / root])
+    }
+}
+
+/// A range of structural modes, any single one of which a loop may have.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FlexureRange {
+    /// Lowest f_n, in the unit of the loop's frequencies.
+    pub from: f64,
+    /// Least ζ.
+    pub damping_ratio: f64,
+    /// Where a mode may act.
+    pub flexures: Vec<Flexure>,
+    /// Points on the circle of the least |1 + L·factor|.
+    distances: Vec<Complex>,
+}
+
+impl FlexureRange {
+    /// Number of points on the circle.
+    const POINTS: u32 = 12;
+    /// Weight of a share of f_n against one of ζ in [`FlexureRange::depth`].
+    const STEEP: f64 = 10.0;
+
+    /// The range of modes with which |1 + L·factor| must be at least `distance` everywhere.
+    #[must_use]
+    pub fn new(from: f64, damping_ratio: f64, flexures: Vec<Flexure>, distance: f64) -> Self {
+        let point = |k: u32| {
+            let (sin, cos) = libm::sincos(core::f64::consts::TAU * f64::from(k) / f64::from(Self::POINTS));
+            [distance * cos, distance * sin]
+        };
+        let points = if distance > 0.0 { Self::POINTS } else { 1 };
+        Self { from, damping_ratio, flexures, distances: (0..points).map(point).collect() }
+    }
+
+    /// How far a mode within the range would have to change until |1 + L·factor| is no longer below the distance at this frequency:
+    /// zero if no mode does that, else the smaller of ln(ζ/ζ of the range) and a multiple of ln(f_n/from), as a penalty.
+    #[must_use]
+    pub fn depth(&self, loop_gain: Complex, frequency: f64) -> f64 {
+        let mut most = 0.0;
+        for flexure in &self.flexures {
+            for distance in &self.distances {
+                let Some([ratio, damping]) = flexure.border(loop_gain, *distance) else { continue };
+                if ratio * frequency <= self.from || damping <= self.damping_ratio {
+                    continue;
+                }
+                let above = Self::STEEP * libm::log(ratio * frequency / self.from);
+                let damped = libm::log(damping / self.damping_ratio);
+                let depth = if above < damped { above } else { damped };
+                if depth > most {
+                    most = depth;
+                }
+            }
+        }
+        most
+    }
+}
+
+/// What a loop bears.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Tolerance {
+    /// Whether it is stable.
+    pub stable: bool,
+    /// Largest |S|.
+    pub sensitivity: f64,
+    /// Largest depth of its border in the range of structural modes.
+    pub depth: f64,
+}
+
+/// Stability and largest |S| of a loop, as in [`sensitivity`], and the largest [`FlexureRange::depth`] over `frequencies`.
+#[must_use]
+pub fn tolerance(
+    plant: &[Complex],
+    controller: &[Complex],
+    cancelled: &[Complex],
+    frequencies: &[f64],
+    range: Option<&FlexureRange>,
+) -> Tolerance {
+    let (mut most, mut depth) = (0.0, 0.0);
+    let stable = sensitivity(plant, controller, cancelled, |k, s| {
+        if s > most {
+            most = s;
+        }
+        let Some(range) = range else { return };
+        // Below a quarter of the lowest mode |L| would have to be within a sixteenth of 1.
+        if frequencies[k] > 0.25 * range.from {
+            let found = range.depth(over(times(plant[k], controller[k]), cancelled[k]), frequencies[k]);
+            if found > depth {
+                depth = found;
+            }
+        }
+    });
+    Tolerance { stable, sensitivity: libm::sqrt(most), depth }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use core::f64::consts::PI;
+
+    /// The mode that `border` gives is put back into the loop.
+    #[test]
+    fn a_loop_with_the_mode_of_the_border_is_at_the_given_distance_from_oscillation() {
+        let mut found = 0;
+        for flexure in [Flexure::Series, Flexure::Sensor(0.5), Flexure::Sensor(-0.1)] {
+            for k in 0..60_u32 {
+                let (size, angle) = (0.05 * f64::from(1 + k % 12), 0.4 * f64::from(k));
+                let loop_gain = [size * libm::cos(angle), size * libm::sin(angle)];
+                for distance in [[0.0, 0.0], [0.4, 0.0], [-0.1, 0.3]] {
+                    let Some([frequency, damping]) = flexure.border(loop_gain, distance) else { continue };
+                    found += 1;
+                    let value = plus([1.0, 0.0], times(loop_gain, flexure.factor(1.0 / frequency, damping)));
+                    let left = [value[0] - distance[0], value[1] - distance[1]];
+                    assert!(square(left) < 1e-20, "{flexure:?} {loop_gain:?} {distance:?}: {value:?}");
+                }
+            }
+        }
+        assert!(found > 300, "{found}");
+    }
 
     /// L = k z⁻¹/(1 − p z⁻¹) is stable for −(1 + p) < −k < 1 − p … |p − k| < 1; an integrator for 0 < k < 2.
     #[test]

@@ -21,7 +21,7 @@ use specgen_language::spec::SpecSource;
 use specgen_language::ui::Ui;
 use specgen_studies::controllers::{at_run_time, threads};
 use specgen_studies::machine::{PlantOptions, run_failure};
-use specgen_studies::tuning::cma::Cma;
+use specgen_numerics::Cma;
 use specgen_studies::tuning::feasible::{Feasibility, RequiredMargins};
 use specgen_studies::tuning::genetic::{Genetic, Settings};
 use specgen_studies::tuning::search::Progress;

@@ -8,7 +8,6 @@
 //! Settings are words of the controller's `Config`: nothing is built per candidate. A candidate that violates a margin is rejected
 //! before simulation; one that reaches a limit of voltage or stroke is rejected during simulation. Neither is scored.
 
-pub mod cma;
 pub mod evaluate;
 pub mod feasible;
 pub mod front;

@@ -63,7 +63,7 @@ pub fn filled(text: &str, items: &[Item]) -> String {
 
 fn value(placeholder: &str, item: Option<Item>) -> String {
     let inside = |range: Range, unit: f64| {
-        let tried = [1.0, 0.5, 0.1, 0.75, 1.25, 10.0, 100.0, 1e3, 1e4, 1e5, 1e6, 1e9, 1e-3];
+        let tried = [1.0, 0.5, 0.1, 0.75, 1.25, 10.0, 100.0, 1e3, 1e4, 1e5, 1e6, 1e9, 1e-3, -0.5];
         let good = tried.iter().find(|number| range.contains(**number * unit));
         good.unwrap_or_else(|| panic!("no number for {range:?}")).to_string()
     };

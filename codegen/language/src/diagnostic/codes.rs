@@ -162,6 +162,9 @@ codes! {
     ASSUMED_TWICE = "E0346";
     NOISE_AT_REST = "E0347";
     ASSUMED_ON_BOARD = "E0348";
+    MODE_KEY = "E0349";
+    MODE_TWICE = "E0350";
+    TOO_MANY_MODES = "E0351";
 
     // Stability, reach, set-points, gauges, supervisor.
     UNSTABLE_STATIC = "E0401";
@@ -176,6 +179,9 @@ codes! {
     MODE_NOT_NOTCHED = "W0424";
     SLOWER_THAN_P = "W0425";
     HARDLY_DAMPED = "W0426";
+    STRUCTURE_UNSTABLE = "E0427";
+    STRUCTURE_TOO_LOW = "E0428";
+    DESIGN_STALE = "W0429";
     PROBE_MISSES = "E0431";
     GAUGES_BLIND = "E0432";
     GAUGE_RANGE = "E0433";

@@ -1,7 +1,7 @@
 //! The macros and functions of a declaration.
 
 pub(crate) use super::fields::{Fields, Value};
-pub(crate) use super::{Item, Key, Kind, Presence, Range, Section, Shape, join};
+pub(crate) use super::{Item, Key, Kind, MAX_TABLES, Presence, Range, Section, Shape, join};
 pub(crate) use crate::quantity::Dimension;
 
 /// Declares a section once: its rows in the key table, the struct of the model that it fills, and how it is read.

@@ -195,6 +195,12 @@ impl<const N: usize> Value for [f64; N] {
     }
 }
 
+impl<const R: usize, const C: usize> Value for [[f64; C]; R] {
+    fn read(fields: &Fields, path: &str) -> Option<Self> {
+        fields.rows(path)
+    }
+}
+
 impl Value for u32 {
     fn read(fields: &Fields, path: &str) -> Option<Self> {
         fields.whole(path)

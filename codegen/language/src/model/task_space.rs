@@ -6,7 +6,6 @@ use super::electronics::CALIBRATION;
 use super::hysteresis::BANDWIDTH;
 use super::trigger::Trigger;
 use super::{LARGEST_TRAVEL, LARGEST_TURN};
-use crate::keys::MAX_TABLES;
 use crate::keys::declare::*;
 
 /// Largest gain and stiffness in a spec, in SI units: products with it stay finite in both scalars.
@@ -50,6 +49,8 @@ const SLOW_JERK: &str = r#"["1 m/s^3", "1 m/s^3", "1 m/s^3", "10 rad/s^3", "10 r
 const STOP_JERK: &str = r#"["1e4 m/s^3", "1e4 m/s^3", "1e4 m/s^3", "1e5 rad/s^3", "1e5 rad/s^3", "1e5 rad/s^3"]"#;
 const INTEGRAL: &str =
     r#"["4e7 N/(m s)", "4e7 N/(m s)", "2e8 N/(m s)", "1e6 N m/(rad s)", "1e6 N m/(rad s)", "5e5 N m/(rad s)"]"#;
+const COEFFICIENT: Item = Item::Number(Range::closed(-1e6, 1e6));
+const SECTIONS_OF_MODES: &str = "[[0.2, -0.1, 0, -1.5, 0.6], [0.2, -0.1, 0, -1.5, 0.6], [0.2, -0.1, 0, -1.4, 0.5], [0.2, -0.1, 0, -1.4, 0.5], [0, 0, 0, 0, 0], [0, 0, 0, 0, 0]]";
 const STREAM_SPEED: &str = r#"["1 mm/s", "1 mm/s", "1 mm/s", "10 mrad/s", "10 mrad/s", "10 mrad/s"]"#;
 
 choice! {
@@ -144,6 +145,8 @@ section! {
         };
         /// The work piece of [`Interaction::Modelled`]; zero if the spec gives none.
         environment: Environment = Environment::read(fields, "control.environment").unwrap_or(Environment::NONE);
+        /// A design that `specgen design` has written.
+        design: Option<StoredDesign> = StoredDesign::read(fields, "control.design");
         /// Limits of set-points and moves.
         setpoint: SetpointRules = SetpointRules::read(fields, "control.setpoint")?;
         /// Coordinates of set-points.
@@ -224,6 +227,58 @@ section! {
         work: [f64; 6] = list(FRAME), Default(NO_POSE), "", ["0 mm", "0 mm", "0 mm", "0 deg", "0 deg", "30 deg"];
         /// Tool point in {P}: set-points position it, and rotations turn about it.
         tool: [f64; 3] = POINT, Default(["0 mm", "0 mm", "0 mm"]), "", ["0 mm", "0 mm", "40 mm"];
+    }
+}
+
+section! {
+    /// Gains, notches and sections of active damping that `specgen design` has found, with a digest of the values that they were designed from. `specgen check` verifies them. Do not edit them: run `specgen design` again.
+    ///
+    /// Gains in N/m, N m/rad and N/(m s), N m/(rad s), in the order x, y, z, theta_x, theta_y, theta_z.
+    "control.design", Optional => StoredDesign {
+        /// Digest of the values of the spec that the design depends on: a letter, then hexadecimal digits.
+        digest: String = NAME, Required, "", "d0f1e2d3c4b5a6978";
+        /// For each mode of the platform, from the lowest: the section of its active damping, b0, b1, b2, a1, a2 of (b0 + b1/z + b2/z²) / (1 + a1/z + a2/z²).
+        sections: [[f64; 5]; 6] = Shape::Rows(6, &[COEFFICIENT; 5]), Required, "", SECTIONS_OF_MODES;
+        /// Damping ratio that the notch gives to each mode.
+        notch_damping: [f64; 6] = list(&[Item::Number(Range::above(0.0, 1.0)); 6]), Required, "", [0.5, 0.5, 0.4, 0.4, 0.3, 0.3];
+        /// Proportional gain.
+        proportional: [f64; 6] = list(STIFFNESSES), Required, "k_p", ["5e6 N/m", "5e6 N/m", "2e7 N/m", "1e5 N m/rad", "1e5 N m/rad", "5e4 N m/rad"];
+        /// Integral gain.
+        integral: [f64; 6] = list(STIFFNESS_RATES), Required, "k_I", INTEGRAL;
+        /// Bandwidth of the level estimate.
+        level_bandwidth: f64 = BANDWIDTH, Required, "", "450 rad/s";
+        /// Bandwidth of the drift estimate.
+        drift_bandwidth: f64 = BANDWIDTH, Required, "", "20 rad/s";
+    }
+}
+
+impl StoredDesign {
+    /// The section as in a spec, from which the same design is read.
+    #[must_use]
+    pub fn text(&self) -> String {
+        let array = |values: &[f64]| {
+            let values: Vec<String> = values.iter().map(|value| format!("{value:?}")).collect();
+            format!("[{}]", values.join(", "))
+        };
+        let with_units = |values: [f64; 6], along: &str, about: &str| {
+            let units = [along, along, along, about, about, about];
+            let values: Vec<String> =
+                values.iter().zip(units).map(|(value, unit)| format!("\"{value:?} {unit}\"")).collect();
+            format!("[{}]", values.join(", "))
+        };
+        let sections: Vec<String> = self.sections.iter().map(|section| format!("  {},\n", array(section))).collect();
+        format!(
+            "[control.design]\ndigest          = \"{}\"\nsections        = [\n{}]\nnotch_damping   = {}\n\
+             proportional    = {}\nintegral        = {}\nlevel_bandwidth = \"{:?} rad/s\"\n\
+             drift_bandwidth = \"{:?} rad/s\"\n",
+            self.digest,
+            sections.concat(),
+            array(&self.notch_damping),
+            with_units(self.proportional, "N/m", "N m/rad"),
+            with_units(self.integral, "N/(m s)", "N m/(rad s)"),
+            self.level_bandwidth,
+            self.drift_bandwidth
+        )
     }
 }
 

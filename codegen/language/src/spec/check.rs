@@ -13,6 +13,7 @@ mod mechanics;
 mod rate;
 mod records;
 mod robust;
+mod structure;
 mod target;
 mod trajectories;
 mod triggers;
@@ -63,6 +64,9 @@ const CHECKS: &[Check] = &[
     gauges::calibrated_alike,
     gauges::input_of_calibrated,
     robust::ranges_in_order,
+    structure::participations,
+    structure::differ,
+    structure::not_too_many,
     lint::reasons,
     assumed::values,
     trajectories::keys_of_kind,

@@ -30,6 +30,16 @@ enum Scalar {
     Name(String),
 }
 
+impl Scalar {
+    fn number(&self) -> Option<f64> {
+        if let Self::Number(number) = self { Some(*number) } else { None }
+    }
+
+    fn word(&self) -> Option<String> {
+        if let Self::Choice(word) = self { Some((*word).to_owned()) } else { None }
+    }
+}
+
 impl ValueReader<'_> {
     /// The value in the form that its key requires; `None` if there is a finding.
     pub(super) fn read(&mut self, value: &Spanned<DeValue<'_>>) -> Option<Field> {
@@ -46,12 +56,14 @@ impl ValueReader<'_> {
                 (parsed, Vec::new())
             }
             Shape::List(items) => {
-                let (numbers, spans) = self.list(self.path, items, items.len(), value)?;
+                let (numbers, spans) = self.numbers(self.path, items, value)?;
                 (KeyValue::Numbers(numbers), spans)
             }
             Shape::Leading(least, items) => {
-                let (numbers, spans) = self.list(self.path, items, least, value)?;
-                (KeyValue::Numbers(numbers), spans)
+                let (found, spans) = self.items(self.path, items, least, value)?;
+                let words: Vec<String> = found.iter().filter_map(Scalar::word).collect();
+                let numbers = found.iter().filter_map(Scalar::number).collect();
+                (if words.is_empty() { KeyValue::Numbers(numbers) } else { KeyValue::Texts(words) }, spans)
             }
             Shape::Rows(count, items) => self.rows(count, items, value)?,
             Shape::Records => self.texts("a file name", value)?,
@@ -61,31 +73,40 @@ impl ValueReader<'_> {
         Some(Field { parsed, span, items, given: true })
     }
 
-    /// An array of `items`; those after the first `least` are optional: numbers and places.
-    fn list(
+    /// An array of `items`, all of them numbers: the numbers and their places.
+    fn numbers(
+        &mut self,
+        path: &str,
+        items: &'static [Item],
+        value: &Spanned<DeValue<'_>>,
+    ) -> Option<(Vec<f64>, Vec<Range<usize>>)> {
+        let (found, spans) = self.items(path, items, items.len(), value)?;
+        Some((found.iter().filter_map(Scalar::number).collect(), spans))
+    }
+
+    /// An array of `items`; those after the first `least` are optional: values and places.
+    fn items(
         &mut self,
         path: &str,
         items: &'static [Item],
         least: usize,
         value: &Spanned<DeValue<'_>>,
-    ) -> Option<(Vec<f64>, Vec<Range<usize>>)> {
+    ) -> Option<(Vec<Scalar>, Vec<Range<usize>>)> {
         let wanted = if least == items.len() { items.len().to_string() } else { format!("{least} to {}", items.len()) };
         let DeValue::Array(array) = value.get_ref() else {
             return self.wrong_type(path, value, &format!("an array of {wanted} values"), None);
         };
-        let mut numbers = Vec::new();
+        let mut found = Vec::new();
         let mut spans = Vec::new();
         for (i, (item, element)) in items.iter().zip(array.iter()).enumerate() {
             spans.push(text::clamp(self.source, element.span()));
-            if let Some(Scalar::Number(number)) = self.scalar(*item, &format!("{path}[{i}]"), element) {
-                numbers.push(number);
-            }
+            found.extend(self.scalar(*item, &format!("{path}[{i}]"), element));
         }
         if !(least..=items.len()).contains(&array.len()) {
             self.wrong_count(path, value, array.len(), "value", &wanted);
             return None;
         }
-        (numbers.len() == array.len()).then_some((numbers, spans))
+        (found.len() == array.len()).then_some((found, spans))
     }
 
     fn rows(
@@ -101,7 +122,7 @@ impl ValueReader<'_> {
         let mut spans = Vec::new();
         for (i, element) in array.iter().enumerate().take(count) {
             spans.push(text::clamp(self.source, element.span()));
-            if let Some((row, _)) = self.list(&format!("{}[{i}]", self.path), items, items.len(), element) {
+            if let Some((row, _)) = self.numbers(&format!("{}[{i}]", self.path), items, element) {
                 numbers.extend(row);
             }
         }

@@ -9,8 +9,8 @@ use serde::{Deserialize, Serialize};
 
 use super::factors::{Factor, Factors};
 use crate::machine;
-use crate::tuning::genetic::unit;
 use specgen_language::model::{Model, TaskSpace};
+use specgen_numerics::unit_interval as unit;
 
 /// Separates its random numbers from those of noise and tolerances.
 const STREAM: u64 = 21;

@@ -4,6 +4,7 @@
 //! two elite strings are kept unchanged; crossover makes its fraction of the other children, mutation the rest.
 
 use rand_chacha::ChaCha8Rng;
+use specgen_numerics::unit_interval as unit;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 
 use super::search::Optimiser;
@@ -36,11 +37,6 @@ pub struct Genetic {
     settings: Settings,
     rng: ChaCha8Rng,
     population: Vec<Vec<bool>>,
-}
-
-/// Uniform in [0, 1).
-pub(crate) fn unit(rng: &mut ChaCha8Rng) -> f64 {
-    (rng.next_u64() >> 11) as f64 / (1_u64 << 53) as f64
 }
 
 fn below(rng: &mut ChaCha8Rng, count: usize) -> usize {
@@ -88,7 +84,7 @@ impl Optimiser for Genetic {
     }
 
     fn tell(&mut self, costs: &[Option<f64>]) {
-        let order = super::search::ranked(costs);
+        let order = specgen_numerics::ranked(costs);
         // Rejected strings have zero fitness.
         let mut fitness = vec![0.0; costs.len()];
         for (rank, &index) in order.iter().enumerate() {

@@ -10,6 +10,7 @@ use std::time::{Duration, Instant};
 use host_sim::closed_loop::RunError;
 use host_sim::controller::Controller;
 use serde::Serialize;
+use specgen_numerics::Cma;
 
 use super::{Case, Evaluation, Score, Setting, Space};
 use crate::tuning::feasible::Feasibility;
@@ -23,12 +24,14 @@ pub trait Optimiser {
     fn tell(&mut self, costs: &[Option<f64>]);
 }
 
-/// Indices in ascending order of cost, rejected ones last; ties keep the order of the list.
-pub(super) fn ranked(costs: &[Option<f64>]) -> Vec<usize> {
-    let mut order: Vec<usize> = (0..costs.len()).collect();
-    let key = |index: &usize| costs[*index].unwrap_or(f64::INFINITY);
-    order.sort_by(|a, b| key(a).total_cmp(&key(b)));
-    order
+impl Optimiser for Cma {
+    fn ask(&mut self) -> Vec<Vec<f64>> {
+        Self::ask(self)
+    }
+
+    fn tell(&mut self, costs: &[Option<f64>]) {
+        Self::tell(self, costs);
+    }
 }
 
 /// Options of a search.

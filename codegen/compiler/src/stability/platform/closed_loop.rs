@@ -16,6 +16,7 @@ mod driven;
 use super::law::Tuning;
 use super::modes::ModalBasis;
 use super::notch::{Biquad, Notch};
+use super::structure::StructuralChannel;
 use super::sampled::{PLACE, Plant, shown, states};
 use specgen_numerics::{Matrix, Matrix6, spectral_radius};
 use specgen_runtime::{ControlMode, Law};
@@ -60,6 +61,8 @@ pub struct ClosedLoop {
     pub notch: Option<Notch>,
     /// D of each mode in P/F, if there is active damping.
     pub active_damping: Option<[Biquad; 6]>,
+    /// Structural modes that are known.
+    pub structure: Vec<StructuralChannel>,
     /// Cut-off of the velocity filter, rad/s.
     pub velocity_cutoff: f64,
     /// Diagonal of K_e, N/m and N m/rad.
@@ -97,7 +100,7 @@ impl ClosedLoop {
     }
 
     /// diag(ω⁻²) A: from a modal force to the leg motion that it requests.
-    fn asked(&self, modal_force: &Matrix6) -> Matrix6 {
+    pub(super) fn asked(&self, modal_force: &Matrix6) -> Matrix6 {
         core::array::from_fn(|i| {
             let square = self.basis.frequencies[i] * self.basis.frequencies[i];
             modal_force[i].map(|x| x / square)

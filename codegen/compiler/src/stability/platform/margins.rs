@@ -8,8 +8,10 @@ use super::closed_loop::{ClosedLoop, Conditions};
 use super::law::{LoopKind, Tuning};
 use super::rule::is_stable;
 use super::search::largest_stable;
+use super::structure::{Border, Corners};
 use super::{nominal_conditions, worst_radius};
 use specgen_numerics::eigenvalues;
+use specgen_numerics::nyquist::Flexure;
 use specgen_runtime::ControlMode;
 
 /// Upper ends of the search for margins.
@@ -39,6 +41,8 @@ pub struct ModeMargins {
     pub settling: Option<f64>,
     /// Oscillating closed-loop modes with damping below 0.5, by frequency.
     pub modes: Vec<ClosedMode>,
+    /// For each kind of structural mode, the smallest damping ratio that it must have.
+    pub borders: Vec<(Flexure, Border)>,
 }
 
 /// A pair of closed-loop poles.
@@ -51,7 +55,8 @@ pub struct ClosedMode {
 }
 
 impl ModeMargins {
-    pub(super) fn of(closed_loop: &ClosedLoop, law: ControlMode, tuning: &Tuning, ratios: [f64; 2]) -> Self {
+    pub(super) fn of(corners: &Corners, law: ControlMode, tuning: &Tuning, ratios: [f64; 2]) -> Self {
+        let closed_loop = corners.closed_loop();
         let stable = |tuning: &Tuning, conditions: &Conditions| is_stable(closed_loop, law, tuning, conditions);
         let contacts = [false, true];
         let contacts = if closed_loop.environment == [0.0; 6] { &contacts[..1] } else { &contacts[..] };
@@ -97,6 +102,9 @@ impl ModeMargins {
             delay_margin: delay_margin_ticks.map(|ticks| ticks * closed_loop.period),
             settling,
             modes,
+            borders: [Flexure::Series, Flexure::Sensor(0.5), Flexure::Sensor(-0.1)]
+                .map(|flexure| (flexure, corners.border(law, tuning, flexure)))
+                .to_vec(),
         }
     }
 }

@@ -87,7 +87,7 @@ fn damped(design: &Design, damping: &ActiveDamping) -> String {
     for (mode, found) in design.modes.iter().zip(&damping.modes) {
         // Writing to a String cannot fail.
         let _ = match found {
-            Some(DampedMode { compliance, sensitivity: [nominal, worst], slow, without }) => writeln!(
+            Some(DampedMode { compliance, sensitivity: [nominal, worst], slow, without, .. }) => writeln!(
                 text,
                 "    {:>7.1} Hz            {compliance:>6.3} x    {nominal:>6.2}  {worst:>6.2}   {:.3} {:.3} {:.2} ({:.3} {:.3} {:.2})",
                 mode.frequency / TAU,

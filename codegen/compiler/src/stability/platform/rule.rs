@@ -6,7 +6,8 @@
 //! damping, free and touching the declared work piece.
 
 use super::closed_loop::{ClosedLoop, Conditions};
-use super::damping::{self, ActiveDamping};
+use super::damping::{self, ActiveDamping, DampedLaw};
+use super::structure::StructureDemand;
 use super::law::{LoopKind, Tuning};
 use super::search::largest_stable;
 use super::{LARGEST_RADIUS, nominal_conditions};
@@ -81,11 +82,20 @@ fn start(closed_loop: &ClosedLoop, limit: f64) -> Tuning {
     }
 }
 
-/// Adds active damping to the loop. Returns it with the gains and bandwidths of its design.
-pub(super) fn damped(closed_loop: &mut ClosedLoop, limit: f64, adapting: Law) -> (ActiveDamping, Tuning) {
-    let (damping, tuning) = damping::design(closed_loop, adapting, &start(closed_loop, limit));
-    closed_loop.active_damping = Some(damping.sections);
-    (damping, tuning)
+/// Adds active damping and its notch to the loop: the `stored` law of a spec, or a new design. Returns it with its effect.
+pub(super) fn damped(
+    closed_loop: &mut ClosedLoop,
+    limit: f64,
+    adapting: Law,
+    stored: Option<DampedLaw>,
+    demand: &StructureDemand,
+) -> (ActiveDamping, DampedLaw) {
+    let start = start(closed_loop, limit);
+    let law = stored.unwrap_or_else(|| damping::search(closed_loop, adapting, &start, demand));
+    let effect = damping::effect(closed_loop, adapting, &start, &law);
+    closed_loop.active_damping = Some(law.sections);
+    closed_loop.notch = damping::notch_of(closed_loop, &law.notch_damping);
+    (effect, law)
 }
 
 /// Gains of P alone.

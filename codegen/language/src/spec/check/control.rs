@@ -21,8 +21,8 @@ pub(super) fn parts_need_it(f: &Fields, findings: &mut Findings) -> Option<()> {
     if there(f).is_some() {
         return Some(());
     }
-    let tables = ["gauge", "trajectory", "trigger"].map(|section| format!("{section}[0]"));
-    let parts = tables.iter().filter_map(|path| Some((path.as_str(), f.table(path)?)));
+    let tables = ["gauge[0]", "trajectory[0]", "trigger[0]", "mode[0]", "robust.structure"];
+    let parts = tables.iter().filter_map(|path| Some((*path, f.table(path)?)));
     let key = "sensor.calibration";
     let calibration = f.given(key).then(|| (key, f.span(key)));
     for (path, span) in parts.chain(calibration) {

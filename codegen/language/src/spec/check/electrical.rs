@@ -88,12 +88,14 @@ pub(super) fn stroke_fits_gain(f: &Fields, findings: &mut Findings) -> Option<()
 }
 
 pub(super) fn resonance_below_tick_rate(f: &Fields, findings: &mut Findings) -> Option<()> {
-    let (resonance, period) = (f.number("actuator.resonance")?, f.number("timing.period")?);
-    if resonance * period > 0.5 {
+    let period = f.number("timing.period")?;
+    let modes = (0..f.count("mode")).map(|index| format!("mode[{index}].frequency"));
+    for path in ["actuator.resonance".to_owned()].into_iter().chain(modes) {
+        let Some(resonance) = f.number(&path).filter(|resonance| resonance * period > 0.5) else { continue };
         findings.add(
             codes::RESONANCE_ALIASED,
-            "actuator.resonance",
-            f.span("actuator.resonance"),
+            &path,
+            f.span(&path),
             format!(
                 "the resonance at {} Hz is above half the tick rate of {} Hz",
                 number(resonance),

@@ -5,11 +5,9 @@
 //! linear algebra whose bits depend on the processor, and the result is written into a spec.
 
 use rand_chacha::ChaCha8Rng;
-use rand_chacha::rand_core::SeedableRng;
+use rand_chacha::rand_core::{Rng, SeedableRng};
 
-use super::genetic::unit;
-use super::search::{Optimiser, ranked};
-use specgen_numerics::diagonalize;
+use crate::diagonalize;
 
 /// Initial step, relative to the range, and the step at which the search restarts.
 const STEP: f64 = 0.15;
@@ -78,8 +76,8 @@ impl Cma {
         if let Some(spare) = self.spare.take() {
             return spare;
         }
-        let radius = libm::sqrt(-2.0 * libm::log(1.0 - unit(&mut self.rng)));
-        let (sin, cos) = libm::sincos(core::f64::consts::TAU * unit(&mut self.rng));
+        let radius = libm::sqrt(-2.0 * libm::log(1.0 - unit_interval(&mut self.rng)));
+        let (sin, cos) = libm::sincos(core::f64::consts::TAU * unit_interval(&mut self.rng));
         self.spare = Some(radius * sin);
         radius * cos
     }
@@ -109,6 +107,21 @@ impl Cma {
     }
 }
 
+/// A number in [0, 1) of 53 random bits.
+#[must_use]
+pub fn unit_interval(rng: &mut ChaCha8Rng) -> f64 {
+    (rng.next_u64() >> 11) as f64 / (1_u64 << 53) as f64
+}
+
+/// Indices in ascending order of cost, rejected ones last; ties keep the order of the list.
+#[must_use]
+pub fn ranked(costs: &[Option<f64>]) -> Vec<usize> {
+    let mut order: Vec<usize> = (0..costs.len()).collect();
+    let key = |index: &usize| costs[*index].unwrap_or(f64::INFINITY);
+    order.sort_by(|a, b| key(a).total_cmp(&key(b)));
+    order
+}
+
 fn identity(n: usize) -> Vec<Vec<f64>> {
     (0..n).map(|i| (0..n).map(|j| if i == j { 1.0 } else { 0.0 }).collect()).collect()
 }
@@ -121,13 +134,15 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
     sum
 }
 
-impl Optimiser for Cma {
-    fn ask(&mut self) -> Vec<Vec<f64>> {
+impl Cma {
+    /// The next generation: numbers in [0, 1].
+    pub fn ask(&mut self) -> Vec<Vec<f64>> {
         self.asked = (0..self.population).map(|_| self.draw()).collect();
         self.asked.clone()
     }
 
-    fn tell(&mut self, costs: &[Option<f64>]) {
+    /// Costs of that generation in its order; `None` for rejected candidates.
+    pub fn tell(&mut self, costs: &[Option<f64>]) {
         let n = self.mean.len();
         let dimension = n as f64;
         let order = ranked(costs);
