@@ -160,12 +160,20 @@ impl Description {
         six(&self.output_names, stem)
     }
 
+    /// Index of a configuration word.
+    ///
+    /// # Errors
+    /// If there is no such word.
+    pub fn config(&self, name: &str) -> Result<usize, DescriptionError> {
+        position(&self.config_names, name)
+    }
+
     /// Sets one configuration word by name, as a real or an integer according to its kind.
     ///
     /// # Errors
     /// If there is none of that name, or the value of an integer word is not an integer.
     pub fn set_config(&self, words: &mut [u64], name: &str, value: f64) -> Result<(), DescriptionError> {
-        let place = position(&self.config_names, name)?;
+        let place = self.config(name)?;
         if let Some(slot) = words.get_mut(place) {
             *slot = self.encode(name, value)?;
         }

@@ -175,9 +175,9 @@ pub struct PlatformDefaults {
     pub level_weight: f64,
     /// ω2 per tick.
     pub drift_weight: f64,
-    /// Gains of P/F.
+    /// Gains of P/F with EWMA or PCC.
     pub gains: Gains,
-    /// Gains of P alone.
+    /// Gains of P and of P/F with Invhys.
     pub position_gains: Gains,
     /// K_e.
     pub environment_stiffness: [f64; 6],

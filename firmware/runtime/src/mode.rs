@@ -31,11 +31,11 @@ impl ControlMode {
         !matches!(self, Self::F(_))
     }
 
-    /// Whether that feedback has `position_gains` in place of `gains`.
+    /// Whether that feedback works without estimates, and so has `position_gains` in place of `gains`.
     #[inline]
     #[must_use]
     pub const fn own_gains(self) -> bool {
-        matches!(self, Self::P)
+        self.feeds_back() && matches!(self.law(), Law::Invhys)
     }
 
     /// Whether the legs go through the inverse Preisach model; if not, they are taken as linear.

@@ -5,11 +5,25 @@ use super::rig::{Noise, OnBoard, PlatformRig, PlatformRun, RunOptions};
 use super::specimen::Specimen;
 use super::table::{MachiningTable, PoseRow, PoseTable};
 use crate::closed_loop::{Preparation, RunError};
-use crate::controller::TickController;
+use crate::controller::{ControllerError, TickController};
 use crate::trajectory::PoseTrajectory;
 use specgen_runtime::ControlMode;
 
 pub use crate::scenario::select;
+
+/// Selects a mode of Tables 5 to 8. The paper compares the laws of P/F at equal gains, so Invhys gets those of the other two.
+///
+/// # Errors
+/// As [`select`], and if the controller has no gains.
+pub fn select_at_equal_gains(controller: &mut dyn TickController, mode: u32) -> Result<(), ControllerError> {
+    let mut words = controller.default_config();
+    let description = controller.description();
+    description.set_config(&mut words, "mode", f64::from(mode))?;
+    let [from, to] = [description.config("kp[0]")?, description.config("position_kp[0]")?];
+    // k_p, k_I and k_v of six axes.
+    words.copy_within(from..from + 18, to);
+    controller.configure(&words)
+}
 
 /// The modes of Tables 5 to 8.
 pub const FREE_MODES: [(&str, u32); 3] = [ControlMode::WORDS[4], ControlMode::WORDS[5], ControlMode::WORDS[6]];
@@ -95,8 +109,8 @@ impl PlatformScenario {
         self.prepared.clone().run(controller, trajectory, &options)
     }
 
-    /// Tables 5 to 8: every mode on every trajectory. The controller keeps the last mode; other configuration words are the
-    /// spec's.
+    /// Tables 5 to 8: every mode on every trajectory. The controller keeps the last mode; other configuration words, except
+    /// those of [`select_at_equal_gains`], are the spec's.
     ///
     /// # Errors
     /// As [`PlatformRig::run`], and if the controller has no `mode` word.
@@ -109,7 +123,7 @@ impl PlatformScenario {
         let mut table = PoseTable::default();
         for NamedTrajectory { name, frequency, trajectory } in trajectories {
             for &(mode, word) in modes {
-                select(controller, word)?;
+                select_at_equal_gains(controller, word)?;
                 let run = self.run(controller, *trajectory)?;
                 table.rows.push(PoseRow::of(name, mode, *frequency, run.scored()?));
             }

@@ -332,7 +332,7 @@ impl TickController for PlatformOracle {
         let config = &self.config;
         let state = &mut self.state;
         let mode = config.mode;
-        let [kp, ki, kv] = if mode == 0 { &config.position_gains } else { &config.gains };
+        let [kp, ki, kv] = if matches!(mode, 0 | 4) { &config.position_gains } else { &config.gains };
         let (has_feedback, has_adaptation) = (mode == 0 || mode >= 4, matches!(mode, 2 | 3 | 5 | 6));
         let has_drift = matches!(mode, 3 | 6);
         let requested = Vector::from_fn(|leg, _| state.legs[leg].requested);

@@ -234,12 +234,12 @@ fn of_gains(scalar: Scalar) -> [Setting; 8] {
     let rest = [LARGEST_TRAVEL, LARGEST_TURN].map(|most| Range::Number(round(-most), round(most)));
     let (p, i, v) = (["N/m", "N m/rad"], ["N/(m s)", "N m/(rad s)"], ["N s/m", "N m s/rad"]);
     [
-        six("kp", p, "k_p of P/F.", "`gains.proportional`"),
-        six("ki", i, "k_I of P/F.", "`gains.integral`"),
-        six("kv", v, "k_v of P/F.", "`gains.derivative`"),
-        six("position_kp", p, "k_p of P alone.", "`position_gains.proportional`"),
-        six("position_ki", i, "k_I of P alone.", "`position_gains.integral`"),
-        six("position_kv", v, "k_v of P alone.", "`position_gains.derivative`"),
+        six("kp", p, "k_p of P/F with EWMA or PCC.", "`gains.proportional`"),
+        six("ki", i, "k_I of P/F with EWMA or PCC.", "`gains.integral`"),
+        six("kv", v, "k_v of P/F with EWMA or PCC.", "`gains.derivative`"),
+        six("position_kp", p, "k_p of P, and of P/F with Invhys.", "`position_gains.proportional`"),
+        six("position_ki", i, "k_I of P, and of P/F with Invhys.", "`position_gains.integral`"),
+        six("position_kv", v, "k_v of P, and of P/F with Invhys.", "`position_gains.derivative`"),
         six("environment_stiffness", p, "K_e: stiffness of the work piece.", "`control.environment.stiffness`"),
         Setting {
             range: rest,

@@ -25,10 +25,10 @@ mod search;
 mod structure;
 
 use serde::Serialize;
-use specgen_runtime::{ControlMode, Platform};
+use specgen_runtime::{ControlMode, Law, Platform};
 
 use specgen_language::diagnostic::Diagnostic;
-use specgen_language::model::{Gains, Interaction, Model, TaskSpace};
+use specgen_language::model::{Gains, Interaction, Model, StoredDesign, TaskSpace};
 use specgen_numerics::{Matrix6, jacobian, mass_matrix};
 
 pub use super::LARGEST_RADIUS;
@@ -82,11 +82,19 @@ pub struct Design {
     pub notch: Option<Notch>,
     /// Active damping of each mode in P/F, if the spec enables it.
     pub damping: Option<ActiveDamping>,
+    /// What `[control.design]` may hold, and whether it had to be searched.
+    #[serde(skip)]
+    pub stored: Option<StoredDesign>,
+    /// Whether the law was searched, as the spec stores none.
+    #[serde(skip)]
+    pub searched: bool,
+    /// Lowest frequency of a structural mode that every control mode must bear, Hz.
+    pub structure_from: f64,
     /// Ω, rad/s: level bandwidth at which EWMA alone becomes unstable.
     pub bandwidth_limit: f64,
-    /// Gains and bandwidths of F and P/F, from the spec or from the rule.
+    /// Bandwidths of F and P/F, and gains of P/F with estimates, from the spec or from the rule.
     pub combined: Tuning,
-    /// Gains of P alone; its bandwidths are zero.
+    /// Gains of P and of P/F with Invhys; the bandwidths are zero.
     pub position: Tuning,
     /// Whether the check includes contact with the declared work piece.
     pub touching: bool,
@@ -121,12 +129,25 @@ pub fn design(model: &Model, task: &TaskSpace, plant: &RestDynamics) -> Result<D
     let demand = StructureDemand::of(model, &closed_loop.basis);
     let given = task.gains.as_ref().map(gains);
     let given = rule::TuningKeys { gains: given.as_ref(), bandwidths: task.adaptation };
-    let damping = task.active_damping.then(|| rule::damped(&mut closed_loop, limit, start_law(model), None, &demand));
+    if let Some(found) = refusal::too_low(model, &closed_loop, &demand) {
+        return Err(vec![found]);
+    }
+    // A law without estimates has the sections of PCC: its gains are chosen for them afterwards.
+    let adapting = if start_law(model) == Law::Invhys { Law::Pcc } else { start_law(model) };
+    let digest = damping::digest(&closed_loop, adapting, &demand);
+    let stored = task.design.as_ref().filter(|design| design.digest == digest);
+    let mut searched = false;
+    let damping = task.active_damping.then(|| {
+        searched = stored.is_none();
+        rule::damped(&mut closed_loop, limit, adapting, stored.map(DampedLaw::from), &demand)
+    });
+    let closed_loop = closed_loop;
+    let corners = structure::Corners::of(&closed_loop, &demand);
     let start = damping.as_ref().map(|(_, law)| &law.tuning);
-    let combined = rule::combined(&closed_loop, limit, given, start, ratios);
-    let position = task.position_gains.as_ref().map_or_else(|| rule::alone(&closed_loop, limit, ratios), gains);
+    let combined = rule::combined(&corners, limit, given, start, ratios);
+    let position = task.position_gains.as_ref().map_or_else(|| rule::alone(&corners, limit, ratios), gains);
     refusal::check(model, task, &closed_loop, &combined, &position)?;
-    let corners = structure::Corners::of(&closed_loop);
+    refusal::structure(model, task, &corners, [&combined, &position])?;
     let margins: Vec<ModeMargins> = ControlMode::all()
         .map(|law| {
             let tuning = if law.own_gains() { &position } else { &combined };
@@ -134,7 +155,7 @@ pub fn design(model: &Model, task: &TaskSpace, plant: &RestDynamics) -> Result<D
         })
         .collect();
     let mut findings = refusal::thin(model, task, &closed_loop, &margins);
-    findings.extend(refusal::slower_than_position(model, task, &combined, &position));
+    findings.extend(task.design.as_ref().filter(|_| stored.is_none()).map(|_| refusal::stale(model)));
     findings.extend(damping.as_ref().and_then(|(damping, _)| refusal::hardly_damped(model, &closed_loop, damping)));
     let basis = &closed_loop.basis;
     Ok(Design {
@@ -147,7 +168,10 @@ pub fn design(model: &Model, task: &TaskSpace, plant: &RestDynamics) -> Result<D
         lead: lead(model, task, basis),
         lead_given: task.lead.is_some(),
         notch: closed_loop.notch.clone(),
+        stored: damping.as_ref().map(|(_, law)| law.to_store(digest, &combined)),
+        searched,
         damping: damping.map(|(damping, _)| damping),
+        structure_from: demand.from,
         bandwidth_limit: limit,
         combined,
         position,
@@ -199,6 +223,7 @@ pub fn closed_loop_of(model: &Model, task: &TaskSpace, plant: &RestDynamics) -> 
     // c_a = β k_a with β = 2 ζ/ω_1: damping grows with frequency.
     let damping = basis.frequencies.map(|frequency| task.modal_damping * frequency / basis.frequencies[0]);
     let period = model.timing.period;
+    let structure = structure::known(model, &basis, &plant.jacobian);
     let notch = task.notch_damping.map(|ratio| Notch::of(&basis, &damping, ratio, period));
     Some(ClosedLoop {
         basis,
@@ -208,7 +233,7 @@ pub fn closed_loop_of(model: &Model, task: &TaskSpace, plant: &RestDynamics) -> 
         gauge_lag: model.sensor.lag,
         notch,
         active_damping: None,
-        structure: if std::env::var("KNOWN").is_ok() { vec![StructuralChannel{flexure: specgen_numerics::nyquist::Flexure::Series, frequency: core::f64::consts::TAU*870.0, damping_ratio: 0.1, place: None}]} else {Vec::new()},
+        structure,
         velocity_cutoff: task.velocity_cutoff,
         environment: task.environment.stiffness,
         measured: task.interaction == Interaction::Measured,

@@ -387,21 +387,19 @@ fn zz_print_borders() {
     let (mut model, mut task) = model();
     task.notch_damping = Some(1.0);
     if let Ok(x) = std::env::var("F0") { model.structure.from = Some(x.parse().unwrap()); }
-    for damped in [true] {
+    for damped in [false, true] {
         task.active_damping = damped;
         let start = std::time::Instant::now();
-        let found = design(&model, &task, &rest()).unwrap();
+        let found = match design(&model, &task, &rest()) { Ok(f) => f, Err(e) => { eprintln!("REF {e:?}"); continue } };
         eprintln!("damped {damped}: {:?}", start.elapsed());
         if let Some(d) = &found.damping { for m in d.modes.iter().flatten() { eprintln!("MODE compl {:.3} S {:.2?} slow {:.3?} without {:.3?} tracking {:.3}", m.compliance, m.sensitivity, m.slow, m.without, m.tracking); } }
         eprintln!("TUNING {:?}", found.combined);
-        for one in &found.margins {
-            for (kind, border) in &one.borders {
-                let line: Vec<String> = [500.0, 600.0, 700.0, 870.0, 900.0, 1000.0, 1200.0, 1500.0, 2000.0]
-                    .iter()
-                    .map(|f| border.worst(*f).map_or("-".into(), |[f, z]| format!("{z:.3}@{f:.0}")))
-                    .collect();
-                eprintln!("{:<12} {kind:?} {:.4} {}", one.law.to_string(), border.exact, line.join(" "));
-            }
+        for one in &found.margins { for b in &one.borders { eprintln!("B {} {} {:?}", one.law, b.kind, b.worst(found.structure_from)); } }
+        if damped {
+            task.design = found.stored.clone();
+            let start = std::time::Instant::now();
+            let again = design(&model, &task, &rest()).unwrap();
+            eprintln!("STORED {:?} {} same {}", start.elapsed(), again.searched, again.combined == found.combined && again.damping == found.damping && again.notch == found.notch);
         }
     }
 }

@@ -132,9 +132,9 @@ section! {
         active_damping: bool = fields.flag("control.active_damping")?;
         /// Whether the integral is transferred to the estimates when the set-point comes to rest.
         hand_over: bool = fields.flag("control.hand_over")?;
-        /// Gains of P and F together. None: the compiler's start rule.
+        /// Gains of P/F with EWMA or PCC. None: the compiler's start rule.
         gains: Option<Gains> = Gains::read(fields, "gains");
-        /// Gains of P alone. None: the compiler's start rule.
+        /// Gains of P and of P/F with Invhys. None: the compiler's start rule.
         position_gains: Option<Gains> = Gains::read(fields, "position_gains");
         /// Ω1 (level) and Ω2 (drift), rad/s: the weight per tick is Ω T_s, at most 1. None: the compiler's start rule.
         adaptation: Option<[f64; 2]> = bandwidths(fields);
@@ -283,7 +283,7 @@ impl StoredDesign {
 }
 
 section! {
-    /// Diagonal gains of (7) for P/F in the order x, y, z, theta_x, theta_y, theta_z. Without it the compiler derives them.
+    /// Diagonal gains of (7) for P/F with EWMA or PCC, in the order x, y, z, theta_x, theta_y, theta_z. Without it the compiler derives them.
     ///
     /// In N/m, N m/rad and, with their times, N/(m s), N m/(rad s), N s/m, N m s/rad.
     "gains" ["pid"], Optional => Gains {
@@ -298,7 +298,7 @@ section! {
 
 impl Gains {
     pub(crate) const OF_POSITION: Section =
-        Section { name: "position_gains", doc: "The same for P alone.", ..Self::SECTION };
+        Section { name: "position_gains", doc: "The same for P, and for P/F with Invhys.", ..Self::SECTION };
 }
 
 section! {

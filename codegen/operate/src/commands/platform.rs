@@ -26,7 +26,7 @@ use specgen_language::table::{left, right, row};
 use specgen_language::ui::Ui;
 use specgen_runtime::ControlMode;
 
-/// Gains of each kind, in the order of the settings; those of P alone have the prefix `position_`.
+/// Gains of each kind, in the order of the settings; those of P and of P/F with Invhys have the prefix `position_`.
 const GAINS: [&str; 3] = ["kp", "ki", "kv"];
 /// Why a frame has no such pose.
 const BEYOND: &str = "rotation exceeds the 15 deg limit for frames";
@@ -196,7 +196,7 @@ impl<P: Port> Operator<P> {
             places.extend(found.map(|(place, _)| (place, *value)));
             if places.len() == before {
                 return Err(format!(
-                    "there is no gain `{name}`; expected kp, ki, kv or, for P alone, position_kp, position_ki, position_kv, each for all axes or for one, as in ki[2]"
+                    "there is no gain `{name}`; expected kp, ki, kv or, for P and P/F with Invhys, position_kp, position_ki, position_kv, each for all axes or for one, as in ki[2]"
                 ));
             }
         }

@@ -4,7 +4,7 @@ use host_sim::closed_loop::RunError;
 use host_sim::controller::TickController;
 use host_sim::platform::PlatformScenario;
 use host_sim::platform::rig::{PoseSample, Record, RunOptions};
-use host_sim::platform::scenario::{FREE_MODES, select};
+use host_sim::platform::scenario::{FREE_MODES, select_at_equal_gains};
 use host_sim::platform::table::{PoseRow, PoseTable};
 use host_sim::trajectory::{PaperPose, Reading};
 
@@ -41,7 +41,7 @@ pub fn sections(
             ["Free motion, case 1: along x, y and z", "Free motion, case 2: along z, rotation about x and y"][case],
             command,
         )
-        .text("P/F with each adaptation law; target and true pose of the platform, both relative to rest, including the bias. Errors are target minus true pose.");
+        .text("P/F with each adaptation law at equal gains; target and true pose of the platform, both relative to rest, including the bias. Errors are target minus true pose.");
         let mut table = PoseTable::default();
         let mut refused = Vec::new();
         for (place, frequency) in FREQUENCIES.into_iter().enumerate() {
@@ -49,7 +49,7 @@ pub fn sections(
             let trajectory = PaperPose { path, reading: Reading::Corrected, frequency };
             let mut figures = Figures::new(case, place, frequency, sampled.options.interval);
             for (mode, word) in FREE_MODES {
-                select(controller, word)?;
+                select_at_equal_gains(controller, word)?;
                 let run = sampled.run(controller, &trajectory)?;
                 let Ok(errors) = run.scored() else {
                     refused.push(format!("{mode} at {frequency} Hz"));

@@ -11,7 +11,7 @@ use host_sim::closed_loop::RunError;
 use host_sim::controller::TickController;
 use host_sim::coverage::Coverage;
 use host_sim::platform::rig::{PlatformRun, Record};
-use host_sim::platform::scenario::{FREE_MODES, select};
+use host_sim::platform::scenario::{FREE_MODES, select, select_at_equal_gains};
 use host_sim::platform::table::{AXES, MachiningRow, MachiningTable, PoseRow, PoseTable};
 use host_sim::platform::{PlatformScenario, WorkPart};
 use host_sim::trajectory::{PaperPath, PaperPose, PoseTarget, PoseTrajectory, Reading};
@@ -270,7 +270,7 @@ impl Experiment<'_> {
                 self.ui.progress(&format!("Tables 5 to 8: {name} at {frequency} Hz"));
                 let trajectory = PaperPose { path, reading: Reading::Corrected, frequency };
                 for (mode, word) in FREE_MODES {
-                    select(self.controller, word).map_err(environment)?;
+                    select_at_equal_gains(self.controller, word).map_err(environment)?;
                     let run = self.scenario.run(self.controller, &trajectory);
                     let row = |run: &PlatformRun| PoseRow::of(name, mode, frequency, &run.errors);
                     free.rows.extend(self.keep(&format!("{name}-{frequency}hz-{mode}"), run)?.as_ref().map(row));

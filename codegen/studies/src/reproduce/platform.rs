@@ -2,7 +2,7 @@
 
 use host_sim::closed_loop::RunError;
 use host_sim::controller::TickController;
-use host_sim::platform::scenario::{FREE_MODES, MACHINING_MODES, select};
+use host_sim::platform::scenario::{FREE_MODES, MACHINING_MODES, select, select_at_equal_gains};
 use host_sim::platform::table::{MachiningTable, PoseRow, PoseTable, paper_machining, paper_rms};
 use host_sim::platform::{PlatformScenario, WorkPart};
 use host_sim::trajectory::{PaperPath, PaperPose, Reading};
@@ -35,7 +35,7 @@ pub fn free_motion(
 ) -> Result<(), RunError> {
     let trajectory = PaperPose { path, reading: Reading::Corrected, frequency };
     for (mode, word) in FREE_MODES {
-        select(controller, word)?;
+        select_at_equal_gains(controller, word)?;
         let run = scenario.run(controller, &trajectory)?;
         table.rows.push(PoseRow::of(name, mode, frequency, run.scored()?));
     }

@@ -65,10 +65,9 @@ impl Feasibility {
         // A running controller may be switched to any of them; the one of the spec is asked first.
         let own = start_mode(model, task);
         let mut laws = vec![own];
-        if !own.own_gains() {
-            let others = [LoopKind::Estimates, LoopKind::Combined].into_iter().flat_map(LoopKind::modes);
-            laws.extend(others.filter(|law| *law != own));
-        }
+        let kinds: &[LoopKind] =
+            if own.own_gains() { &[LoopKind::Position] } else { &[LoopKind::Estimates, LoopKind::Combined] };
+        laws.extend(kinds.iter().copied().flat_map(LoopKind::modes).filter(|law| *law != own));
         Self::Platform { closed_loop: Box::new(closed_loop), laws, ratios: model.adaptation.gain_ratio, required }
     }
 

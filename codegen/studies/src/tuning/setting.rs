@@ -21,11 +21,11 @@ pub enum Setting {
         /// ω2.
         drift: f64,
     },
-    /// A platform: gains and bandwidths of P/F (F uses the bandwidths), and gains of P.
+    /// A platform: gains with estimates and their bandwidths, and gains without estimates.
     Platform {
         /// Used by P/F and F.
         combined: Tuning,
-        /// Used by P, which has no feed-forward.
+        /// Used by P and P/F with Invhys, which have no estimates.
         position: Tuning,
         /// Control interval, s.
         period: f64,

@@ -42,9 +42,9 @@ pub struct Settings<P: Platform> {
     pub drift_weight: P::Real,
     /// Voltage limits and slew limit in converter codes; from `actuator` and `dac`.
     pub code_limits: CodeLimits,
-    /// Gains of P/F; from `gains` or the start rule.
+    /// Gains of P/F with EWMA or PCC; from `gains` or the start rule.
     pub gains: Gains<P::Real>,
-    /// Gains of P alone; from `gains.position` or the start rule.
+    /// Gains of P and of P/F with Invhys; from `position_gains` or the start rule.
     pub position_gains: Gains<P::Real>,
     /// K_e and h_e; from `environment`.
     pub environment: Environment<P::Real>,

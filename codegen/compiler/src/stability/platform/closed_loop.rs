@@ -91,7 +91,12 @@ impl ClosedLoop {
         let shortest = 1e-4 * self.period;
         [
             if self.lag > shortest { self.lag } else { shortest },
-            if self.gauge_lag > shortest { self.gauge_lag } else { 0.0 },
+            // Structural modes of what the gauges see need readings that are states.
+            match self.structure.iter().any(StructuralChannel::on_readings) {
+                _ if self.gauge_lag > shortest => self.gauge_lag,
+                true => shortest,
+                false => 0.0,
+            },
         ]
     }
 
@@ -155,7 +160,7 @@ impl<'a> Assembly<'a> {
         let integrating = if feeds_back { used(&tuning.integral) } else { Vec::new() };
         let damped = if feeds_back { used(&tuning.derivative) } else { Vec::new() };
         let notch = |wanted: bool| if wanted && of.notch.is_some() { 12 } else { 0 };
-        let mut total = states(of.lags_used()[1]);
+        let mut total = states(of.lags_used()[1], &of.structure);
         let mut take = |count: usize| {
             total += count;
             total - count
@@ -400,7 +405,7 @@ impl<'a> Assembly<'a> {
     fn plant(&mut self, request: &[Signal; 6]) {
         let contact = self.of.contact(self.conditions.touching);
         let damping = self.of.damping.map(|ratio| ratio * self.conditions.damping);
-        let plant = Plant::new(&self.of.basis, &damping, self.conditions.stiffness, &contact, self.of.lags_used());
+        let plant = Plant::new(&self.of.basis, &damping, self.conditions.stiffness, &contact, self.of.lags_used(), &self.of.structure);
         let whole = libm::floor(self.conditions.delay);
         let part = self.conditions.delay - whole;
         // Request of `age` ticks ago.

@@ -21,6 +21,7 @@ use super::closed_loop::{ClosedLoop, Conditions};
 use super::law::Tuning;
 use super::notch::{Biquad, Notch, in_reach};
 use super::structure::{DELAY, LAG, RATIO, STIFFNESS, StructureDemand};
+use specgen_language::model::StoredDesign;
 use specgen_numerics::nyquist::{Complex, FlexureRange, over, plus, sensitivity, square, times, tolerance};
 use specgen_numerics::{Cma, Matrix6};
 use specgen_runtime::Law;
@@ -48,11 +49,14 @@ const RINGING: f64 = 0.46;
 /// Penalties for an unstable corner, and for the depth of a border in the range of structural modes.
 const UNSTABLE: f64 = 1000.0;
 const DEPTH: f64 = 20.0;
+/// Share of the least ζ to which the sections alone and the estimates alone are designed: the loop of one mode is not the whole.
+const SPARE: f64 = 0.7;
 /// Evaluations of the cost: for the lowest mode, with gains and bandwidths, and for others.
-fn env(n:&str,d:usize)->usize{std::env::var(n).ok().and_then(|x|x.parse().ok()).unwrap_or(d)}
-
+const EVALUATIONS: [usize; 2] = [3000, 2000];
 const POPULATION: usize = 14;
 const SEED: u64 = 49;
+/// Raised when a change of this search makes other designs from the same values.
+const VERSION: u32 = 1;
 
 /// Effect of active damping on a mode; ratios.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -87,6 +91,48 @@ pub struct DampedLaw {
     pub notch_damping: [f64; 6],
     /// Gains and bandwidths.
     pub tuning: Tuning,
+}
+
+impl From<&StoredDesign> for DampedLaw {
+    fn from(stored: &StoredDesign) -> Self {
+        Self {
+            sections: stored.sections.map(|[b0, b1, b2, a1, a2]| Biquad { b: [b0, b1, b2], a: [a1, a2] }),
+            notch_damping: stored.notch_damping,
+            tuning: Tuning {
+                proportional: stored.proportional,
+                integral: stored.integral,
+                derivative: [0.0; 6],
+                level_bandwidth: stored.level_bandwidth,
+                drift_bandwidth: stored.drift_bandwidth,
+            },
+        }
+    }
+}
+
+impl DampedLaw {
+    /// What a spec stores, with the gains and bandwidths that the whole loop bears.
+    pub(super) fn to_store(&self, digest: String, tuning: &Tuning) -> StoredDesign {
+        StoredDesign {
+            digest,
+            sections: self.sections.map(|Biquad { b: [b0, b1, b2], a: [a1, a2] }| [b0, b1, b2, a1, a2]),
+            notch_damping: self.notch_damping,
+            proportional: tuning.proportional,
+            integral: tuning.integral,
+            level_bandwidth: tuning.level_bandwidth,
+            drift_bandwidth: tuning.drift_bandwidth,
+        }
+    }
+}
+
+/// Digest of what a design depends on.
+pub(super) fn digest(of: &ClosedLoop, adapting: Law, demand: &StructureDemand) -> String {
+    let ClosedLoop { basis, damping, period, lag, gauge_lag, notch, structure, .. } = of;
+    // Numbers in `{:?}` are written with all their digits.
+    let text = format!(
+        "{:?}",
+        (VERSION, basis, damping, [period, lag, gauge_lag], notch.is_some(), structure, adapting as u8, demand)
+    );
+    format!("d{}", &specgen_toolchain::sha256(text.as_bytes())[..16])
 }
 
 /// Gains and weights in the loop of one mode.
@@ -183,12 +229,13 @@ pub(super) fn search(of: &ClosedLoop, adapting: Law, start: &Tuning, demand: &St
             let (factors, section) = decode(x);
             let feedback = family.feedback(&scaled(start, factors));
             let figures = family.figures(&family.controller(&feedback, section[0], Some(&section[1..])));
-            // The same numbers without estimates, and without feedback: modes that a running controller can be switched to.
-            let still = family.controller(&Feedback { weights: [0.0; 2], ..feedback }, section[0], Some(&section[1..]));
+            // The sections alone, for which gains without estimates are chosen later, and the estimates alone.
+            let still = Feedback { gains: [0.0; 2], weights: [0.0; 2] };
+            let still = family.controller(&still, section[0], Some(&section[1..]));
             let estimates = family.controller(&Feedback { gains: [0.0; 2], ..feedback }, section[0], None);
             figures.cost(&rule) + family.unborne(&still) + family.unborne(&estimates)
         };
-        let best = minimise(&start_at, env("EV", 5000), cost);
+        let best = minimise(&start_at, EVALUATIONS[usize::from(free < 4)], cost);
         let (factors, section) = decode(&best);
         gains[group] = Some([factors[0], factors[1]]);
         bandwidths = Some([factors[2], factors[3]]);
@@ -244,7 +291,7 @@ pub(super) fn notch_of(of: &ClosedLoop, damping: &[f64; 6]) -> Option<Notch> {
 }
 
 fn minimise(start: &[f64], evaluations: usize, cost: impl Fn(&[f64]) -> f64) -> Vec<f64> {
-    let mut cma = Cma::new(start, env("POP", POPULATION), env("SEED", 49) as u64);
+    let mut cma = Cma::new(start, POPULATION, SEED);
     let mut best = (start.to_vec(), cost(start));
     let mut spent = 1;
     while spent < evaluations {
@@ -292,10 +339,9 @@ struct Family<'a> {
     mode: usize,
     frequency: f64,
     damping: f64,
-    /// Hz, z⁻¹ and s/ω of the bilinear map at each frequency.
+    /// Hz and z⁻¹ at each frequency.
     hertz: Vec<f64>,
     delay: Vec<Complex>,
-    slope: Vec<Complex>,
     /// |compliance|² without feedback, relative to the static compliance.
     open: Vec<f64>,
     nominal: Vec<Complex>,
@@ -387,7 +433,6 @@ impl<'a> Family<'a> {
             };
             demand.suspects.iter().flat_map(|one| corners.iter().map(move |plant| with(one, plant))).collect()
         });
-        let bilinear = 1.0 / libm::tan(0.5 * frequency * period);
         let open = |angle: &f64| {
             let ratio = angle / (frequency * period);
             let (re, im) = (1.0 - ratio * ratio, 2.0 * damping * ratio);
@@ -411,14 +456,12 @@ impl<'a> Family<'a> {
             damping,
             hertz: angles.iter().map(|angle| super::loop_gain::hertz(*angle, period)).collect(),
             delay: angles.iter().map(|angle| [libm::cos(*angle), -libm::sin(*angle)]).collect(),
-            // (1 − z⁻¹)/(1 + z⁻¹) = j tan(ωT/2).
-            slope: angles.iter().map(|angle| [0.0, bilinear * libm::tan(0.5 * angle)]).collect(),
             open: angles.iter().map(open).collect(),
             nominal,
             corners,
             suspects,
-            range: demand.map(|demand| demand.range(1.0 / WITH_STRUCTURE)),
-            bare_range: demand.map(|demand| demand.range(0.0)),
+            range: demand.map(|demand| demand.range(1.0 / WITH_STRUCTURE, 1.0)),
+            bare_range: demand.map(|demand| demand.range(0.0, SPARE)),
             slow: slow.map(place),
             width,
         }

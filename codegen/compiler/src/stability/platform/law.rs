@@ -31,9 +31,9 @@ pub enum LoopKind {
     Open,
     /// The estimates alone, by their bandwidths.
     Estimates,
-    /// The pose error, by `gains`, and the estimates of a law that has any.
+    /// The pose error, by `gains`, and the estimates.
     Combined,
-    /// The pose error, by `position_gains`.
+    /// The pose error alone, by `position_gains`.
     Position,
 }
 

@@ -75,9 +75,9 @@ impl ClosedLoop {
     /// p of each mode at the angles ωT, with the amplifier's lag times `lag`: from a requested leg motion to the readings. Contact
     /// and λ are left out.
     pub(super) fn modal_responses(&self, conditions: &Conditions, lag: f64, angles: &[f64]) -> Vec<[Complex<f64>; 6]> {
-        let [shortest, gauge_lag] = ClosedLoop { lag: lag * self.lag, ..self.clone() }.lags_used();
+        let [shortest, gauge_lag] = ClosedLoop { lag: lag * self.lag, structure: Vec::new(), ..self.clone() }.lags_used();
         let damping = self.damping.map(|ratio| ratio * conditions.damping);
-        let plant = Plant::new(&self.basis, &damping, conditions.stiffness, &[[0.0; 6]; 6], [shortest, gauge_lag]);
+        let plant = Plant::new(&self.basis, &damping, conditions.stiffness, &[[0.0; 6]; 6], [shortest, gauge_lag], &[]);
         let sampled = plant.sample(self.period);
         let seen = if shown(gauge_lag) == PLACE { 1 } else { 3 };
         let of = |mode: usize, angle: f64| {

@@ -11,7 +11,6 @@ use super::search::largest_stable;
 use super::structure::{Border, Corners};
 use super::{nominal_conditions, worst_radius};
 use specgen_numerics::eigenvalues;
-use specgen_numerics::nyquist::Flexure;
 use specgen_runtime::ControlMode;
 
 /// Upper ends of the search for margins.
@@ -42,7 +41,7 @@ pub struct ModeMargins {
     /// Oscillating closed-loop modes with damping below 0.5, by frequency.
     pub modes: Vec<ClosedMode>,
     /// For each kind of structural mode, the smallest damping ratio that it must have.
-    pub borders: Vec<(Flexure, Border)>,
+    pub borders: Vec<Border>,
 }
 
 /// A pair of closed-loop poles.
@@ -92,6 +91,7 @@ impl ModeMargins {
             1.0 + LARGEST_DELAY,
         )
         .map(|x| x - 1.0);
+        let loci = corners.loci(law, tuning);
         let (settling, modes) = closed_modes(closed_loop, law, tuning);
         Self {
             law,
@@ -102,9 +102,7 @@ impl ModeMargins {
             delay_margin: delay_margin_ticks.map(|ticks| ticks * closed_loop.period),
             settling,
             modes,
-            borders: [Flexure::Series, Flexure::Sensor(0.5), Flexure::Sensor(-0.1)]
-                .map(|flexure| (flexure, corners.border(law, tuning, flexure)))
-                .to_vec(),
+            borders: corners.demand().flexures.iter().map(|flexure| corners.border(&loci, *flexure)).collect(),
         }
     }
 }

@@ -4,9 +4,10 @@ use core::f64::consts::{PI, TAU};
 
 use super::closed_loop::{ClosedLoop, Conditions};
 use super::damping::ActiveDamping;
-use super::law::{LoopKind, Tuning, start_mode};
+use super::law::{LoopKind, Tuning};
 use super::margins::ModeMargins;
 use super::search::largest_stable;
+use super::structure::{Corners, MOST_DAMPING, StructureDemand};
 use super::{LARGEST_RADIUS, nominal_conditions, notch, worst_radius};
 use specgen_language::diagnostic::{Diagnostic, codes};
 use specgen_language::model::{Model, TaskSpace};
@@ -69,6 +70,91 @@ pub(super) fn check(
         findings.push(case.gains("position_gains", task.position_gains.is_some(), unstable, position, largest));
     }
     if findings.is_empty() { Ok(()) } else { Err(findings) }
+}
+
+/// Lowest frequency of an unknown structural mode over that of the platform's lowest: below, no law that follows a path bears one.
+const LEAST_FROM: f64 = 1.6;
+
+/// Refuses a range of structural modes that begins too close to the modes of the platform.
+pub(super) fn too_low(model: &Model, closed_loop: &ClosedLoop, demand: &StructureDemand) -> Option<Diagnostic> {
+    let lowest = closed_loop.basis.frequencies[0] / TAU;
+    let least = libm::ceil(LEAST_FROM * lowest);
+    (demand.from < LEAST_FROM * lowest).then(|| {
+        Diagnostic::at(
+            &model.spans,
+            &["robust.structure.f0", "robust.structure"],
+            codes::STRUCTURE_TOO_LOW,
+            format!(
+                "f0 is {:.0} Hz, {:.2} times the lowest mode of the platform, {lowest:.0} Hz; expected at least {LEAST_FROM} times",
+                demand.from,
+                demand.from / lowest
+            ),
+            format!(
+                "f0 = \"{least:.0} Hz\" or more; list a mode below that as [[mode]], if it is known, or raise its frequency"
+            ),
+        )
+    })
+}
+
+/// Refuses control modes that are unstable with a structural mode which the spec permits.
+pub(super) fn structure(
+    model: &Model,
+    task: &TaskSpace,
+    corners: &Corners,
+    [combined, position]: [&Tuning; 2],
+) -> Result<(), Vec<Diagnostic>> {
+    let demand = corners.demand();
+    let mut worst: Option<(ControlMode, &'static str, [f64; 2])> = None;
+    // From where on every mode of the least damping is borne by all control modes.
+    let mut from = demand.from;
+    for law in ControlMode::all().filter(|law| LoopKind::of(*law) != LoopKind::Open) {
+        let tuning = if law.own_gains() { position } else { combined };
+        if corners.bears(law, tuning) {
+            continue;
+        }
+        let loci = corners.loci(law, tuning);
+        for flexure in &demand.flexures {
+            let border = corners.border(&loci, *flexure);
+            let found = border.worst(demand.from).unwrap_or([demand.from, 0.0]);
+            if worst.is_none_or(|(_, _, [_, most])| found[1] > most) {
+                worst = Some((law, border.kind, found));
+            }
+            while loci.demanded(*flexure, from) > demand.damping_ratio && from < 0.5 / corners.closed_loop().period {
+                from *= 1.02;
+            }
+        }
+    }
+    let Some((law, kind, [frequency, damping])) = worst else { return Ok(()) };
+    let damping = if damping > MOST_DAMPING { format!("more than {MOST_DAMPING}") } else { format!("{damping:.3}") };
+    let own = task.gains.is_some() || task.position_gains.is_some() || task.adaptation.is_some();
+    let fix = if own {
+        "leave out gains and bandwidths of your own, and the compiler designs them for this range"
+    } else {
+        "damp the structure, or measure its response (`specgen learn --excite`)"
+    };
+    Err(vec![Diagnostic::at(
+        &model.spans,
+        &["robust.structure.f0", "robust.structure", "gains", "position_gains", "adaptation.level_bandwidth", "control"],
+        codes::STRUCTURE_UNSTABLE,
+        format!(
+            "control mode {law} is unstable with a structural mode that may exist: a {kind} mode near {frequency:.0} Hz needs a \
+             damping ratio of {damping}, and the spec permits {} from {:.0} Hz on, at ±10 % of stiffness and gain, ±30 % of the \
+             amplifier's lag, one tick more",
+            demand.damping_ratio, demand.from
+        ),
+        format!("{fix}; or [robust.structure] f0 = \"{:.0} Hz\", if nothing is below it", libm::ceil(from * 1.01)),
+    )])
+}
+
+/// Warns about a stored design that was made from other values.
+pub(super) fn stale(model: &Model) -> Diagnostic {
+    Diagnostic::at(
+        &model.spans,
+        &["control.design.digest", "control.design", "control"],
+        codes::DESIGN_STALE,
+        "the stored design was made from other values than those of this spec, so it is not used".to_owned(),
+        "run `specgen design` on this spec; or remove [control.design]".to_owned(),
+    )
 }
 
 /// A law and its spectral radius.
@@ -298,41 +384,6 @@ pub(super) fn hardly_damped(model: &Model, closed_loop: &ClosedLoop, damping: &A
             codes::HARDLY_DAMPED,
             format!("active damping has little effect on the modes at {}", left.join(", ")),
             "shorten timing.period, or use an amplifier with less lag; or disable active damping: active_damping = false"
-                .to_owned(),
-        )
-    })
-}
-
-/// Notes if P may be more accurate than P/F without estimates: both then reject disturbances only by their integral action, and
-/// that of P may be faster.
-pub(super) fn slower_than_position(
-    model: &Model,
-    task: &TaskSpace,
-    combined: &Tuning,
-    position: &Tuning,
-) -> Option<Diagnostic> {
-    let mode = start_mode(model, task);
-    if LoopKind::of(mode) != LoopKind::Combined || mode.law() != Law::Invhys {
-        return None;
-    }
-    let ratio = combined.integral.iter().zip(&position.integral).fold(1.0, |most: f64, (both, alone)| {
-        let ratio = alone / both;
-        if ratio > most { ratio } else { most }
-    });
-    let message = if ratio.is_infinite() {
-        "P/F with Invhys has no integral action on an axis where P has it: in contact P may be more accurate".to_owned()
-    } else {
-        format!(
-            "P/F with Invhys corrects disturbances {ratio:.1} times slower than P: in contact P may be more accurate"
-        )
-    };
-    (ratio > 1.0).then(|| {
-        Diagnostic::at(
-            &model.spans,
-            &["adaptation.mode", "adaptation"],
-            codes::SLOWER_THAN_P,
-            message,
-            "write adaptation.mode = \"ewma\" or \"pcc\": their estimates correct what the integral action of P/F leaves"
                 .to_owned(),
         )
     })

@@ -28,8 +28,8 @@ pub fn describe(design: &Design) -> String {
         "  level estimate stable up to {:.1} rad/s {notch}; used {:.1}, drift {:.2} rad/s",
         design.bandwidth_limit, design.combined.level_bandwidth, design.combined.drift_bandwidth
     );
-    let _ = write!(text, "{}", gains("gains", &design.combined));
-    let _ = write!(text, "{}", gains("gains of P alone", &design.position));
+    let _ = write!(text, "{}", gains("gains of P/F ewma, pcc", &design.combined));
+    let _ = write!(text, "{}", gains("gains of P, P/F invhys", &design.position));
     if let Some(damping) = &design.damping {
         text.push_str(&damped(design, damping));
     }

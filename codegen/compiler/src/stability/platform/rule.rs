@@ -1,13 +1,13 @@
 //! Tuning rule for gains and bandwidths that the spec leaves out.
 //!
 //! From Ω, the bandwidth at which the level estimate alone becomes unstable: Ω1 = Ω/4.5, Ω2 = 0.044 Ω1, k_I = Ω/12 · K,
-//! k_p = 0.05 K (without notch 0.005), P alone k_I = Ω/2 · K, with K = diag(Jᵀ k_a J). Then all of them are multiplied by 0.85 until
+//! k_p = 0.05 K (without notch 0.005), without estimates k_I = Ω/2 · K, with K = diag(Jᵀ k_a J). Then all of them are multiplied by 0.85 until
 //! the loop is stable with λ = 2, with stiffness ± 15 % at λ = 1.4, and with one more tick of delay at λ = 1.3, each with 0.7 of the
-//! damping, free and touching the declared work piece.
+//! damping, free and touching the declared work piece, and with every structural mode that the spec demands.
 
 use super::closed_loop::{ClosedLoop, Conditions};
 use super::damping::{self, ActiveDamping, DampedLaw};
-use super::structure::StructureDemand;
+use super::structure::{Corners, StructureDemand};
 use super::law::{LoopKind, Tuning};
 use super::search::largest_stable;
 use super::{LARGEST_RADIUS, nominal_conditions};
@@ -17,7 +17,7 @@ use specgen_runtime::{ControlMode, Law};
 const LEVEL: f64 = 4.5;
 /// Drift over level bandwidth.
 const DRIFT: f64 = 0.044;
-/// Ω over k_I/K, with F and alone.
+/// Ω over k_I/K, with estimates and without.
 const INTEGRAL: f64 = 12.0;
 const INTEGRAL_ALONE: f64 = 2.0;
 /// k_p/K with and without notch.
@@ -47,26 +47,27 @@ pub fn bandwidth_limit(closed_loop: &ClosedLoop) -> f64 {
     .unwrap_or(0.0)
 }
 
-/// Gains and bandwidths of P/F: those in the spec are kept, the others follow the rule.
+/// Bandwidths of F and P/F, and gains of P/F with estimates: those in the spec are kept, the others follow the rule.
 ///
 /// With active damping, the values of its design, `damped`, replace the rule's start values.
 pub(super) fn combined(
-    closed_loop: &ClosedLoop,
+    corners: &Corners,
     limit: f64,
     given: TuningKeys,
     damped: Option<&Tuning>,
     ratios: [f64; 2],
 ) -> Tuning {
+    let closed_loop = corners.closed_loop();
     let start = damped.copied().unwrap_or_else(|| start(closed_loop, limit));
     // A mode is fixed if the spec gives all that it uses.
     let (fixed, free): (Vec<ControlMode>, Vec<_>) =
         [LoopKind::Estimates, LoopKind::Combined].into_iter().flat_map(LoopKind::modes).partition(|mode| {
-            (given.gains.is_some() || !mode.feeds_back()) && (given.bandwidths.is_some() || mode.law() == Law::Invhys)
+            (given.gains.is_some() || !mode.feeds_back()) && given.bandwidths.is_some()
         });
     if free.is_empty() {
         return given.over(&start);
     }
-    shrink(closed_loop, &free, &fixed, ratios, |factor| given.over(&start.scaled(factor, factor)))
+    shrink(corners, &free, &fixed, ratios, |factor| given.over(&start.scaled(factor, factor)))
 }
 
 /// Start values of the rule.
@@ -99,14 +100,15 @@ pub(super) fn damped(
 }
 
 /// Gains of P alone.
-pub(super) fn alone(closed_loop: &ClosedLoop, limit: f64, ratios: [f64; 2]) -> Tuning {
+pub(super) fn alone(corners: &Corners, limit: f64, ratios: [f64; 2]) -> Tuning {
+    let closed_loop = corners.closed_loop();
     let stiffness = &closed_loop.basis.axis_stiffness;
     let start = Tuning {
         proportional: stiffness.map(|k| proportional(closed_loop) * k),
         integral: stiffness.map(|k| limit / INTEGRAL_ALONE * k),
         ..Tuning::NONE
     };
-    shrink(closed_loop, &LoopKind::Position.modes(), &[], ratios, |factor| start.scaled(factor, factor))
+    shrink(corners, &LoopKind::Position.modes(), &[], ratios, |factor| start.scaled(factor, factor))
 }
 
 /// The values of a tuning in the spec.
@@ -147,12 +149,13 @@ pub(super) fn is_stable(closed_loop: &ClosedLoop, law: ControlMode, tuning: &Tun
 /// If a `fixed` law, with values from the spec, is unstable under a condition, the other laws do not have to be stable under it: the
 /// rule cannot fix that.
 fn shrink(
-    closed_loop: &ClosedLoop,
+    corners: &Corners,
     laws: &[ControlMode],
     fixed: &[ControlMode],
     ratios: [f64; 2],
     tuning: impl Fn(f64) -> Tuning,
 ) -> Tuning {
+    let closed_loop = corners.closed_loop();
     let contacts: &[bool] = if closed_loop.environment == [0.0; 6] { &[false] } else { &[false, true] };
     let mut asked: Vec<Conditions> = ROBUST
         .iter()
@@ -163,7 +166,8 @@ fn shrink(
     let mut factor = 1.0;
     for _ in 0..SHRINKS {
         let tried = tuning(factor);
-        if laws.iter().all(|&law| asked.iter().all(|conditions| is_stable(closed_loop, law, &tried, conditions))) {
+        let stable = |law: ControlMode| asked.iter().all(|conditions| is_stable(closed_loop, law, &tried, conditions));
+        if laws.iter().all(|&law| stable(law) && corners.bears(law, &tried)) {
             return tried;
         }
         factor *= SHRINK;

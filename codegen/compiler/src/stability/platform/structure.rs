@@ -14,7 +14,8 @@ use super::closed_loop::{ClosedLoop, Conditions};
 use super::law::Tuning;
 use super::loop_gain::{ComplexMatrix, loci};
 use super::modes::ModalBasis;
-use specgen_language::model::{Model, StructuralKind};
+use specgen_language::model::{Model, StructuralKind, StructuralMode};
+use specgen_numerics::{Matrix, Matrix6, multiply6};
 use specgen_numerics::nyquist::{Flexure, FlexureRange};
 use specgen_runtime::ControlMode;
 
@@ -38,8 +39,9 @@ const ABOUT: u32 = 24;
 /// What every loop must bear: any single structural mode of a range, and each of those that are suspected.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StructureDemand {
-    /// Lowest frequency of an unknown mode, Hz, and its least ζ.
+    /// Lowest frequency of an unknown mode, Hz.
     pub from: f64,
+    /// Its least ζ.
     pub damping_ratio: f64,
     /// Where it may act.
     pub flexures: Vec<Flexure>,
@@ -48,9 +50,9 @@ pub struct StructureDemand {
 }
 
 impl StructureDemand {
-    /// The range, with |1 + L·factor| ≥ `distance`.
-    pub(super) fn range(&self, distance: f64) -> FlexureRange {
-        FlexureRange::new(self.from, self.damping_ratio, self.flexures.clone(), distance)
+    /// The range, with |1 + L·factor| ≥ `distance`, and ζ down to a `share` of the least.
+    pub(super) fn range(&self, distance: f64, share: f64) -> FlexureRange {
+        FlexureRange::new(self.from, share * self.damping_ratio, self.flexures.clone(), distance)
     }
 
     /// That of a spec.
@@ -76,6 +78,24 @@ impl StructureDemand {
     }
 }
 
+/// The `[[mode]]` of a spec, as parts of the plant; `jacobian`: ∂l/∂h. None of one gauge without gauges on the platform.
+pub(super) fn known(model: &Model, basis: &ModalBasis, jacobian: &Matrix6) -> Vec<StructuralChannel> {
+    let readings = crate::lower::readings_per_pose(model).ok().flatten();
+    let one = |mode: &StructuralMode| {
+        let (flexure, per_pose) = match mode.kind {
+            StructuralKind::Leg => (Flexure::Series, Some(*jacobian)),
+            StructuralKind::Gauge | StructuralKind::Frame => (Flexure::Sensor(mode.participation), readings),
+        };
+        let place = mode.place.and_then(|index| {
+            let per_mode = multiply6(&per_pose?, &basis.from_modal);
+            let modes = multiply6(&basis.to_modal, &crate::lower::inverse(&per_pose?)?);
+            Some((per_mode[index], modes.map(|row| row[index])))
+        });
+        StructuralChannel { flexure, frequency: TAU * mode.frequency, damping_ratio: mode.damping_ratio, place }
+    };
+    model.structural_modes.iter().map(one).collect()
+}
+
 /// A structural mode of the plant, in modal coordinates.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StructuralChannel {
@@ -94,6 +114,47 @@ impl StructuralChannel {
         matches!(self.flexure, Flexure::Sensor(_))
     }
 
+    /// Row and column of each of its oscillators: that of its one leg or gauge, or one for each mode of the platform.
+    pub(super) fn oscillators(&self) -> Vec<([f64; 6], [f64; 6])> {
+        let unit = |mode: usize| -> [f64; 6] { core::array::from_fn(|i| f64::from(u8::from(i == mode))) };
+        self.place.map_or_else(|| (0..6).map(|mode| (unit(mode), unit(mode))).collect(), |place| vec![place])
+    }
+
+    /// Adds its oscillators, w and ẇ/ω each, to the rates of a plant, w from state `first` on. `signals` is what it acts on, as
+    /// combinations of the states. Returns the state after its own.
+    pub(super) fn add_to(&self, rates: &mut Matrix, signals: &mut [Vec<f64>; 6], first: usize) -> usize {
+        let oscillators = self.oscillators();
+        let count = oscillators.len();
+        let given = signals.clone();
+        for (k, (row, column)) in oscillators.into_iter().enumerate() {
+            let (place, speed) = (first + k, first + count + k);
+            let mut source = vec![0.0; given[0].len()];
+            for (factor, signal) in row.iter().zip(&given) {
+                source.iter_mut().zip(signal).for_each(|(sum, value)| *sum += factor * value);
+            }
+            rates[(place, speed)] = self.frequency;
+            for (state, factor) in source.iter().enumerate() {
+                rates[(speed, state)] += self.frequency * factor;
+            }
+            rates[(speed, place)] -= self.frequency;
+            rates[(speed, speed)] -= 2.0 * self.damping_ratio * self.frequency;
+            // What the mode changes: w − s, or a (s − w − 2ζ ẇ/ω).
+            let share = if let Flexure::Sensor(share) = self.flexure { share } else { -1.0 };
+            let mut change: Vec<f64> = source.iter().map(|value| share * value).collect();
+            change[place] -= share;
+            if self.on_readings() {
+                change[speed] -= 2.0 * share * self.damping_ratio;
+            }
+            for (factor, signal) in column.iter().zip(signals.iter_mut()) {
+                // Zero terms are skipped, so that decoupled states stay exactly decoupled.
+                if *factor != 0.0 {
+                    signal.iter_mut().zip(&change).for_each(|(sum, value)| *sum += factor * value);
+                }
+            }
+        }
+        first + 2 * count
+    }
+
     /// The factor of the plant at ω, rad/s.
     pub(super) fn at(&self, frequency: f64) -> ComplexMatrix {
         let [re, im] = self.flexure.factor(frequency / self.frequency, self.damping_ratio);
@@ -107,18 +168,19 @@ impl StructuralChannel {
     }
 }
 
-/// The smallest damping ratio with which one more structural mode of a kind leaves a control mode stable.
+/// The smallest damping ratio with which one more structural mode leaves a control mode stable.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Border {
+    /// The kind of mode.
+    pub kind: &'static str,
     /// Frequencies of the mode, Hz, ascending.
     pub frequencies: Vec<f64>,
-    /// Smallest ζ at each; zero where every damping is enough.
+    /// Smallest ζ from each to the next; zero where every damping is enough.
     pub damping_ratios: Vec<f64>,
-    pub exact: f64,
 }
 
 impl Border {
-    /// The most demanding frequency from `from` (Hz) on: it, and ζ there.
+    /// The frequency from `from` (Hz) on that demands the most damping, and that ζ; none if every damping is enough.
     #[must_use]
     pub fn worst(&self, from: f64) -> Option<[f64; 2]> {
         let both = self.frequencies.iter().zip(&self.damping_ratios);
@@ -126,26 +188,21 @@ impl Border {
             .max_by(|a, b| a.1.total_cmp(b.1))
             .map(|(frequency, ratio)| [*frequency, *ratio])
     }
-
-    /// The lowest frequency, Hz, from which on ζ = `damping_ratio` is enough; none if there is none.
-    #[must_use]
-    pub fn from(&self, damping_ratio: f64) -> Option<f64> {
-        match self.damping_ratios.iter().rposition(|ratio| *ratio >= damping_ratio) {
-            None => self.frequencies.first().copied(),
-            Some(last) => self.frequencies.get(last + 1).copied(),
-        }
-    }
 }
 
 /// The plant at every corner and frequency, which all control modes share.
 pub(super) struct Corners<'a> {
     of: &'a ClosedLoop,
+    demand: &'a StructureDemand,
     angles: Vec<f64>,
     plants: Vec<Vec<ComplexMatrix>>,
 }
 
+/// Eigenvalues of the open loop of a control mode, each with its frequency in Hz, at every corner.
+pub(super) struct Loci(Vec<(f64, Complex<f64>)>);
+
 impl<'a> Corners<'a> {
-    pub(super) fn of(of: &'a ClosedLoop) -> Self {
+    pub(super) fn of(of: &'a ClosedLoop, demand: &'a StructureDemand) -> Self {
         let angles = angles(of);
         let corner = |stiffness: f64, damping: f64, delay: f64, lag: f64| {
             let conditions = Conditions { stiffness, damping, delay, ..Conditions::NOMINAL };
@@ -158,52 +215,94 @@ impl<'a> Corners<'a> {
                 plants.extend(DELAY.map(|delay| corner(stiffness, 0.7, delay, lag)));
             }
         }
-        Self { of, angles, plants }
+        Self { of, demand, angles, plants }
     }
 
     pub(super) fn closed_loop(&self) -> &'a ClosedLoop {
         self.of
     }
 
-    /// The border of a control mode for one more structural mode.
-    pub(super) fn border(&self, law: ControlMode, tuning: &Tuning, flexure: Flexure) -> Border {
-        let period = self.of.period;
-        let lowest = self.of.basis.frequencies[0] / TAU;
-        let highest = 0.5 / period;
-        let at = |bin: usize| lowest * libm::pow(highest / lowest, bin as f64 / (BINS - 1) as f64);
-        let mut border =
-            Border { frequencies: (0..BINS).map(at).collect(), damping_ratios: vec![0.0; BINS], exact: 0.0 };
-        let controllers: Vec<ComplexMatrix> =
-            self.angles.iter().map(|angle| self.of.controller_at(law, tuning, *angle)).collect();
-        for (corner, plants) in self.plants.iter().enumerate() {
-            let ratios: &[f64] = if corner == 0 { &[1.0] } else { &RATIO };
-            // A curve per eigenvalue is not continuous where two cross; its points are.
-            for ((plant, controller), angle) in plants.iter().zip(&controllers).zip(&self.angles) {
-                for value in loci(&(plant * controller)) {
-                    for ratio in ratios {
-                        let found = flexure.border([ratio * value.re, ratio * value.im], [0.0; 2]);
-                        let Some([factor, damping]) = found else { continue };
-                        if let Ok(x)=std::env::var("F0") && factor * angle / (TAU * period) > x.parse::<f64>().unwrap() && damping > border.exact {border.exact = damping;}
-                        border.include(factor * angle / (TAU * period), damping);
-                    }
+    pub(super) fn demand(&self) -> &'a StructureDemand {
+        self.demand
+    }
+
+    pub(super) fn loci(&self, law: ControlMode, tuning: &Tuning) -> Loci {
+        let mut found = Vec::new();
+        for (k, &angle) in self.angles.iter().enumerate() {
+            let controller = self.of.controller_at(law, tuning, angle);
+            let frequency = super::loop_gain::hertz(angle, self.of.period);
+            for (corner, plants) in self.plants.iter().enumerate() {
+                let ratios: &[f64] = if corner == 0 { &[1.0] } else { &RATIO };
+                for value in loci(&(plants[k] * controller)) {
+                    found.extend(ratios.iter().map(|ratio| (frequency, value * *ratio)));
                 }
             }
         }
+        Loci(found)
+    }
+
+    /// Whether a control mode is stable with every structural mode that it must bear, by the border of stability.
+    pub(super) fn bears(&self, law: ControlMode, tuning: &Tuning) -> bool {
+        let loci = self.loci(law, tuning);
+        self.demand.flexures.iter().all(|flexure| loci.demanded(*flexure, self.demand.from) <= self.demand.damping_ratio)
+            && self.demand.suspects.iter().all(|one| {
+                self.border(&loci, one.flexure).at(one.frequency / TAU) < one.damping_ratio
+            })
+    }
+
+    /// The border of a control mode for one more structural mode.
+    pub(super) fn border(&self, Loci(loci): &Loci, flexure: Flexure) -> Border {
+        let lowest = self.of.basis.frequencies[0] / TAU;
+        let highest = 0.5 / self.of.period;
+        let at = |bin: usize| lowest * libm::pow(highest / lowest, bin as f64 / (BINS - 1) as f64);
+        let mut border = Border {
+            kind: kind_of(flexure),
+            frequencies: (0..BINS).map(at).collect(),
+            damping_ratios: vec![0.0; BINS],
+        };
+        for (frequency, value) in loci {
+            let Some([factor, damping]) = flexure.border([value.re, value.im], [0.0; 2]) else { continue };
+            border.include(factor * frequency, damping);
+        }
         border
+    }
+}
+
+impl Loci {
+    /// The damping ratio that a mode from `from` (Hz) on needs, up to the most that a structural mode is taken to have.
+    pub(super) fn demanded(&self, flexure: Flexure, from: f64) -> f64 {
+        let needed = self.0.iter().filter_map(|(frequency, value)| {
+            let [factor, damping] = flexure.border([value.re, value.im], [0.0; 2])?;
+            (factor * frequency >= from).then_some(damping)
+        });
+        needed.fold(0.0, |most, damping| if damping > most { damping } else { most })
+    }
+}
+
+/// The word of a spec for a kind of mode.
+fn kind_of(flexure: Flexure) -> &'static str {
+    match flexure {
+        Flexure::Series => StructuralKind::Leg.word(),
+        Flexure::Sensor(share) if share > 0.0 => StructuralKind::Gauge.word(),
+        Flexure::Sensor(_) => StructuralKind::Frame.word(),
     }
 }
 
 impl Border {
     fn include(&mut self, frequency: f64, damping: f64) {
         let Some(last) = self.frequencies.iter().rposition(|one| *one <= frequency) else { return };
-        // Both ends of the interval, as the border is a line between bins.
-        for bin in [last, last + 1] {
-            if let Some(ratio) = self.damping_ratios.get_mut(bin)
-                && damping > *ratio
-            {
-                *ratio = damping;
-            }
+        if let Some(ratio) = self.damping_ratios.get_mut(last)
+            && damping > *ratio
+        {
+            *ratio = damping;
         }
+    }
+
+    /// ζ at a frequency, Hz, and about it.
+    fn at(&self, frequency: f64) -> f64 {
+        let next = self.frequencies.iter().position(|one| *one > frequency).unwrap_or(self.frequencies.len());
+        let near = self.damping_ratios.get(next.saturating_sub(2)..(next + 1).min(self.damping_ratios.len()));
+        near.into_iter().flatten().fold(0.0, |most: f64, ratio| if *ratio > most { *ratio } else { most })
     }
 }
 
