@@ -132,7 +132,7 @@ impl FlexureRange {
     /// Number of points on the circle.
     const POINTS: u32 = 12;
     /// Weight of a share of f_n against one of ζ in [`FlexureRange::depth`].
-    const STEEP: f64 = 10.0;
+    const STEEP: f64 = 40.0;
 
     /// The range of modes with which |1 + L·factor| must be at least `distance` everywhere.
     #[must_use]

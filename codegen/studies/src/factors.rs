@@ -30,11 +30,13 @@ pub enum Factor {
     Noise,
     /// Delay of the voltages in control intervals: an integer, not a factor.
     DelayTicks,
+    /// Whether a random platform has what real structures have ([`crate::machine::StructureRange`]): 0 or 1.
+    Structure,
 }
 
 impl Factor {
     /// All parameters, in the order of reports.
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 11] = [
         Self::Mass,
         Self::Stiffness,
         Self::Damping,
@@ -45,6 +47,7 @@ impl Factor {
         Self::GaugeLag,
         Self::Noise,
         Self::DelayTicks,
+        Self::Structure,
     ];
 
     /// Its name in options, corners and `[robust]`.
@@ -61,6 +64,7 @@ impl Factor {
             Self::GaugeLag => "gauge_lag",
             Self::Noise => "noise",
             Self::DelayTicks => "delay_ticks",
+            Self::Structure => "structure",
         }
     }
 
@@ -73,7 +77,7 @@ impl Factor {
     /// The nominal value.
     #[must_use]
     pub fn nominal(self) -> f64 {
-        if self == Self::DelayTicks { 0.0 } else { 1.0 }
+        if matches!(self, Self::DelayTicks | Self::Structure) { 0.0 } else { 1.0 }
     }
 }
 
@@ -136,7 +140,8 @@ impl UserRange {
     /// # Errors
     /// A message with the error and the expected format.
     pub fn parse(text: &str) -> Result<Self, String> {
-        let how = "write NAME=PERCENT such as mass=5%, NAME=LOW:HIGH such as gain=0.9:1.1, or delay_ticks=1";
+        let how =
+            "write NAME=PERCENT such as mass=5%, NAME=LOW:HIGH such as gain=0.9:1.1, delay_ticks=1, or structure=1";
         let Some((name, value)) = text.split_once('=') else { return Err(format!("found `{text}`; {how}")) };
         let name = name.trim();
         let Some(factor) = Factor::ALL.into_iter().find(|factor| factor.name() == name) else {
@@ -150,11 +155,12 @@ impl UserRange {
         let value = value.trim();
         let range = match (value.split_once(':'), value.strip_suffix('%')) {
             (Some((low, high)), _) => [number(low)?, number(high)?],
-            (None, Some(percent)) if factor != Factor::DelayTicks => {
+            (None, Some(percent)) if factor.nominal() == 1.0 => {
                 let part = number(percent)? / 100.0;
                 [1.0 - part, 1.0 + part]
             }
             (None, None) if factor == Factor::DelayTicks => [0.0, number(value)?],
+            (None, None) if factor == Factor::Structure => [number(value)?; 2],
             _ => return Err(format!("found `{text}`; {how}")),
         };
         check(factor, range)?;
@@ -173,6 +179,13 @@ fn check(factor: Factor, [low, high]: [f64; 2]) -> Result<(), String> {
             Ok(())
         } else {
             Err(format!("{factor} from {low} to {high}: expected whole control intervals from 0 to {MOST_TICKS}"))
+        };
+    }
+    if factor == Factor::Structure {
+        return if low == high && (low == 0.0 || low == 1.0) {
+            Ok(())
+        } else {
+            Err(format!("structure from {low} to {high}: expected structure=0 or structure=1"))
         };
     }
     if low > 0.0 && high <= LARGEST {
@@ -208,6 +221,7 @@ impl Factors {
                 Factor::GaugeLag => (declared.gauge_lag, about(0.2)),
                 Factor::Noise => (declared.noise, about(0.5)),
                 Factor::DelayTicks => (declared.delay_ticks.map(|ticks| [0.0, f64::from(ticks)]), [0.0, 1.0]),
+                Factor::Structure => (None, [0.0; 2]),
             };
             // The last option wins, as elsewhere.
             let option = given.iter().rev().find(|given| given.factor == factor).map(|given| given.range);
@@ -218,10 +232,12 @@ impl Factors {
             };
             FactorRange { factor, range, origin }
         };
-        Self(Factor::ALL.into_iter().map(one).collect())
+        // A machine of rigid parts is not listed as one without structure.
+        let listed = |one: &FactorRange| one.factor != Factor::Structure || one.range[1] > 0.0;
+        Self(Factor::ALL.into_iter().map(one).filter(listed).collect())
     }
 
-    /// The ranges, in the order of [`Factor::ALL`].
+    /// The ranges, in the order of [`Factor::ALL`]; the structure only if it is on.
     pub fn iter(&self) -> impl Iterator<Item = &FactorRange> {
         self.0.iter()
     }
@@ -246,6 +262,7 @@ mod tests {
         assert_eq!(range("gain = 0.9 : 1.1"), Ok((Factor::Gain, [0.9, 1.1])));
         assert_eq!(range("delay_ticks=2"), Ok((Factor::DelayTicks, [0.0, 2.0])));
         assert_eq!(range("delay_ticks=1:2"), Ok((Factor::DelayTicks, [1.0, 2.0])));
+        assert_eq!(range("structure=1"), Ok((Factor::Structure, [1.0, 1.0])));
         assert_eq!(range("lag=1:1"), Ok((Factor::Lag, [1.0, 1.0])));
     }
 
@@ -265,6 +282,9 @@ mod tests {
             ("delay_ticks=0.5", "whole control intervals"),
             ("delay_ticks=101", "from 0 to 100"),
             ("delay_ticks=10%", "delay_ticks=1"),
+            ("structure=2", "expected structure=0 or structure=1"),
+            ("structure=0:1", "expected structure=0 or structure=1"),
+            ("structure=5%", "structure=1"),
         ] {
             let error = UserRange::parse(text).unwrap_err();
             assert!(error.contains(fix), "{text}: {error}");

@@ -9,8 +9,13 @@ use std::path::PathBuf;
 use host_sim::closed_loop::{LEGS, RunError};
 use host_sim::plant::{LegParameters, NoiseParameters};
 use host_sim::platform::rig::{Noise, OnBoard, PlatformRig, RunOptions};
-use host_sim::platform::{GaugeSignal, Joints, PlatformParameters, PlatformScenario, Probe, Specimen, UserFrames};
+use host_sim::platform::{
+    GaugeSignal, Imperfections, Joints, Mains, ModePlace, PlatformParameters, PlatformScenario, Probe, Specimen,
+    StructuralMode, UserFrames,
+};
 use host_sim::scenario::LegScenario;
+
+use serde::{Deserialize, Serialize};
 
 use specgen_compiler::compile::Compilation;
 use specgen_language::files;
@@ -190,6 +195,89 @@ pub fn leg(model: &Model, leg: &LegParameters) -> LegParameters {
     }
 }
 
+/// What the spec says about the structure beyond a rigid platform on six legs: its known modes belong here.
+fn known_structure(_model: &Model) -> Imperfections {
+    Imperfections::default()
+}
+
+/// Ranges of a random structure with one mode that the controller does not know.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StructureRange {
+    /// Lowest frequency of the mode, Hz.
+    pub from_hz: f64,
+    /// Highest, Hz.
+    pub to_hz: f64,
+    /// Its damping ratio.
+    pub damping_ratio: [f64; 2],
+    /// Where it may act, with the participation.
+    pub kinds: Vec<(ModePlace, Option<f64>)>,
+}
+
+impl StructureRange {
+    /// For a machine without a declared range: from 2.5 times its lowest mode to 5 kHz, damping ratio 0.01 to 0.03, in the
+    /// legs, the gauge mounts (participation 0.5) or the frame (−0.1).
+    #[must_use]
+    pub fn of(machine: &Specimen) -> Self {
+        let lowest = machine.structure().modes().0[0] / core::f64::consts::TAU;
+        Self {
+            from_hz: 2.5 * lowest,
+            to_hz: 5e3,
+            damping_ratio: [0.01, 0.03],
+            kinds: vec![
+                (ModePlace::Leg(None), None),
+                (ModePlace::Gauge(None), Some(0.5)),
+                (ModePlace::Frame, Some(-0.1)),
+            ],
+        }
+    }
+}
+
+/// Largest transverse stiffness of a joint over the axial one of its leg.
+const STIFFEST_JOINT: f64 = 0.05;
+/// Largest amplitude of the mains in a gauge, m, and their frequency, Hz.
+const MAINS: (f64, f64) = (2e-9, 50.0);
+/// Fastest drift of a gauge, m/s.
+const DRIFT: f64 = 20e-9;
+
+/// A random structure as shares (0 to 1) of its ranges.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct StructureShares {
+    /// Of the mode: kind, frequency and damping ratio, the latter two on logarithmic scales.
+    pub mode: [f64; 3],
+    /// Stiffness of the joints.
+    pub joints: f64,
+    /// Mains: amplitude, gauge, phase.
+    pub mains: [f64; 3],
+    /// Drift of each gauge, either way.
+    pub drift: [f64; LEGS],
+}
+
+impl StructureShares {
+    /// Adds this structure to a machine.
+    pub fn add_to(&self, machine: &mut Imperfections, range: &StructureRange) {
+        let one_of = |share: f64, count: usize| (share * count as f64) as usize;
+        let log = |share: f64, low: f64, high: f64| low * libm::pow(high / low, share);
+        let [kind, frequency, damping] = self.mode;
+        if let Some((place, participation)) = range.kinds.get(one_of(kind, range.kinds.len())) {
+            machine.modes.push(StructuralMode {
+                place: *place,
+                frequency_hz: log(frequency, range.from_hz, range.to_hz),
+                damping_ratio: log(damping, range.damping_ratio[0], range.damping_ratio[1]),
+                participation: *participation,
+            });
+        }
+        machine.joint_stiffness_share = STIFFEST_JOINT * self.joints;
+        let [amplitude, gauge, phase] = self.mains;
+        machine.mains.push(Mains {
+            amplitude_m: MAINS.0 * amplitude,
+            frequency_hz: MAINS.1,
+            gauge: Some(1 + one_of(gauge, LEGS)),
+            phase_rad: core::f64::consts::TAU * phase,
+        });
+        machine.gauge_drift_m_per_s = self.drift.map(|share| DRIFT * (2.0 * share - 1.0));
+    }
+}
+
 fn nominal(model: &Model, task: &TaskSpace) -> PlatformParameters {
     let reference = PlatformParameters::reference();
     let (body, leg) = (&model.platform, &model.leg);
@@ -220,6 +308,7 @@ fn nominal(model: &Model, task: &TaskSpace) -> PlatformParameters {
             plane_normal: task.probes[k].plane_normal,
         }),
         gauge_range_m: model.sensor.range,
+        imperfections: known_structure(model),
         ..reference
     }
 }

@@ -56,6 +56,12 @@ impl SmoothLag {
         self.output
     }
 
+    /// Rate of the output (1/s) at this input.
+    #[must_use]
+    pub fn rate(&self, input: f64) -> f64 {
+        (input - self.output) / self.time_constant
+    }
+
     /// Sets it to the steady state of this input.
     pub fn rest_at(&mut self, input: f64) {
         self.output = input;

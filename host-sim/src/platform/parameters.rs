@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::gauge::Probe;
 use super::geometry::Geometry;
+use super::imperfections::Imperfections;
 use super::inertia::Masses;
 use super::linear::{Matrix3, Six, Three, dot};
 use crate::plant::{Bound, ParameterError, checked};
@@ -91,6 +92,9 @@ pub struct PlatformParameters {
     pub force_range: Six,
     /// Longest integration step, s, at most 20 µs.
     pub step_s: f64,
+    /// What it has beyond a rigid platform on ideal legs; none if absent.
+    #[serde(default, skip_serializing_if = "Imperfections::is_none")]
+    pub imperfections: Imperfections,
 }
 
 /// The reference platform's parameter file, as shipped.
@@ -221,6 +225,7 @@ impl PlatformParameters {
                 expect(&format!("asymmetry of platform_inertia_kg_m2[{row}]"), asymmetry, AtLeast(0.0), AtMost(0.0));
             }
         }
+        out.extend(self.imperfections.findings());
         out
     }
 }

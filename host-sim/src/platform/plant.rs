@@ -1,8 +1,10 @@
 //! The whole plant: six amplifiers and stacks that drive the structure.
 
 use super::contact::{WorkPart, Wrench};
-use super::linear::{LANES, Lane, Six, lanes_of};
+use super::imperfections::Modes;
+use super::linear::{LANES, Lane, Matrix6, Six, lanes_of};
 use super::long_step;
+use super::parameters::PlatformParameters;
 use super::specimen::Specimen;
 use super::structure::{Structure, StructureLanes};
 use crate::closed_loop::Preparation;
@@ -25,6 +27,8 @@ pub struct PlatformPlant {
     structure: Structure,
     /// Lag of the gauges for each coordinate of the pose; none: no lag.
     gauges: Option<[SmoothLag; 6]>,
+    /// Structural modes of legs and gauges.
+    modes: Option<Box<Modes>>,
     longest_step: f64,
     /// Whether long steps are requested, see [`PlatformPlant::step_whole_ticks`]; and the structure of long steps, in
     /// place of the other, while in use.
@@ -38,14 +42,20 @@ impl PlatformPlant {
     pub fn new(specimen: &Specimen) -> Self {
         let nominal = &specimen.nominal;
         let lag = specimen.legs[0].gauge_lag_s;
+        let mut structure = Structure::new(specimen.structure(), nominal.step_s);
+        nominal.imperfections.cable.into_iter().for_each(|cable| structure.attach(cable));
+        // The structure takes what a mode does within a step as straight.
+        let longest_step = nominal.imperfections.leg_step(nominal.step_s);
+        let modes = Modes::of(&nominal.imperfections.modes, readings_near_rest(nominal));
         Self {
             actuators: Actuators::new(&specimen.legs, nominal.amplifier_current_a / nominal.stack_capacitance_f),
             peaks: specimen.legs.each_ref().map(|leg| leg.u_max),
             rest: [0.0; LANES],
             displacement: [0.0; LANES],
-            structure: Structure::new(specimen.structure(), nominal.step_s),
+            structure,
             gauges: (lag > 0.0).then(|| std::array::from_fn(|_| SmoothLag::new(lag))),
-            longest_step: nominal.step_s,
+            modes,
+            longest_step,
             long_steps: false,
             long: None,
         }
@@ -61,7 +71,7 @@ impl PlatformPlant {
     /// stays within 0.02 nm of that of the finest small steps, while small steps of 20 µs are off by 0.13 nm. With
     /// amplifiers faster than a step it stays within 0.3 nm, and at their current limit within 1 nm.
     ///
-    /// Small steps remain in use under a disturbance. `interval` (s) is that of the following holds; others are possible.
+    /// Small steps remain in use under a disturbance, with a cable, and with structural modes of legs. `interval` (s) is that of the following holds; others are possible.
     pub fn step_whole_ticks(&mut self, interval: f64) {
         self.long_steps = true;
         self.lengthen(interval / f64::from(steps_within(interval, LONG * self.longest_step)));
@@ -76,6 +86,9 @@ impl PlatformPlant {
     /// Starts long steps of `step` (s) if possible.
     fn lengthen(&mut self, step: f64) {
         self.shorten();
+        if self.modes.as_ref().is_some_and(|modes| modes.in_legs()) {
+            return;
+        }
         self.long = StructureLanes::of(&self.structure, step, self.actuators.lags()).map(Box::new);
         if self.long.is_some() {
             self.actuators.set_long_step(step);
@@ -101,6 +114,7 @@ impl PlatformPlant {
         self.displacement = [0.0; LANES];
         self.structure.set_state(&[0.0; 6], &[0.0; 6], &[0.0; 6]);
         self.gauges.iter_mut().flatten().for_each(|gauge| gauge.rest_at(0.0));
+        self.modes.iter_mut().for_each(|modes| modes.rest());
         if rest > 0.0 {
             let steps = steps_within(rest / rate, update);
             for step in 1..=steps {
@@ -149,7 +163,8 @@ impl PlatformPlant {
                 for _ in 0..steps {
                     let before = [structure.pose(), structure.rate()];
                     self.displacement = long_step::advance(&mut self.actuators, structure, &self.rest, voltages);
-                    gauges_follow(&mut self.gauges, &before, &[structure.pose(), structure.rate()], step);
+                    let after = [structure.pose(), structure.rate()];
+                    gauges_follow(&mut self.gauges, &mut self.modes, &before, &after, step);
                 }
                 return;
             }
@@ -160,10 +175,16 @@ impl PlatformPlant {
         self.actuators.set_step(step);
         for tick in 0..steps {
             let free = self.actuators.advance(&lanes_of(voltages), tick == 0);
+            let earlier = self.free_displacements();
             self.displacement = std::array::from_fn(|k| (free[k] - self.rest[k]) * 1e-6);
             let before = [self.structure.pose(), self.structure.rate()];
-            self.structure.advance(&self.free_displacements());
-            gauges_follow(&mut self.gauges, &before, &[self.structure.pose(), self.structure.rate()], step);
+            let mut driven = self.free_displacements();
+            if let Some(modes) = self.modes.as_mut().filter(|modes| modes.in_legs()) {
+                driven = modes.legs_follow(&earlier, &driven, step);
+            }
+            self.structure.advance(&driven);
+            let after = [self.structure.pose(), self.structure.rate()];
+            gauges_follow(&mut self.gauges, &mut self.modes, &before, &after, step);
         }
     }
 
@@ -171,6 +192,11 @@ impl PlatformPlant {
     #[must_use]
     pub fn seen(&self) -> Six {
         self.gauges.as_ref().map_or_else(|| self.pose(), |gauges| gauges.each_ref().map(SmoothLag::output))
+    }
+
+    /// What structural modes add to the readings of the gauges, m, and its rate, m/s; none without modes.
+    pub(super) fn added(&self) -> Option<&[Six; 2]> {
+        self.modes.as_ref().map(|modes| modes.added())
     }
 
     /// h, from rest, m and rad.
@@ -231,11 +257,42 @@ impl PlatformPlant {
     }
 }
 
-/// Gauges with a lag follow a step (s) from one pose and rate to another.
-fn gauges_follow(gauges: &mut Option<[SmoothLag; 6]>, before: &[Six; 2], after: &[Six; 2], step: f64) {
+/// Readings per pose near rest.
+fn readings_near_rest(nominal: &PlatformParameters) -> Matrix6 {
+    const STEP: f64 = 1e-6;
+    nominal.probes.map(|probe| {
+        std::array::from_fn(|k| {
+            let [up, down] = [STEP, -STEP].map(|step| {
+                let mut pose = [0.0; 6];
+                pose[k] = step;
+                probe.reading(nominal.height_m, &pose)
+            });
+            (up - down) / (2.0 * STEP)
+        })
+    })
+}
+
+/// Gauges with a lag, and modes in readings, follow a step (s) from one pose and rate to another.
+fn gauges_follow(
+    gauges: &mut Option<[SmoothLag; 6]>,
+    modes: &mut Option<Box<Modes>>,
+    before: &[Six; 2],
+    after: &[Six; 2],
+    step: f64,
+) {
+    let seen = |gauges: &Option<[SmoothLag; 6]>, motion: &[Six; 2]| match gauges {
+        None => *motion,
+        Some(gauges) => {
+            [gauges.each_ref().map(SmoothLag::output), std::array::from_fn(|k| gauges[k].rate(motion[0][k]))]
+        }
+    };
+    let start = modes.as_ref().map(|_| seen(gauges, before));
     for (k, gauge) in gauges.iter_mut().flatten().enumerate() {
         gauge.set_step(step);
         gauge.advance([before[0][k], before[1][k]], [after[0][k], after[1][k]]);
+    }
+    if let (Some(modes), Some(start)) = (modes, start) {
+        modes.gauges_follow(&start, &seen(gauges, after), step);
     }
 }
 

@@ -11,6 +11,7 @@ mod run;
 
 use super::gauge::{GaugeSignal, ProbeLanes};
 use super::geometry::{angles, rotation};
+use super::imperfections::Imperfections;
 use super::linear::Six;
 use super::plant::PlatformPlant;
 use super::sensor::ForceSensor;
@@ -21,6 +22,9 @@ use crate::plant::NoiseParameters;
 
 pub use bench::{BUSY, Bench, BenchState, Command, NOT_FOLLOWED, Request, Tick};
 pub use run::{OnBoard, PlatformRun, PoseSample, Record, RunOptions};
+
+/// Noise stream of the jitter, after those of gauges, amplifiers and force sensor.
+const JITTER_STREAM: u64 = 18;
 
 /// Noise around a plant.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -70,6 +74,11 @@ pub struct PlatformRig {
     last_readings: Six,
     force_sensor: ForceSensor,
     amplifiers: [Gaussian; 6],
+    /// Mains, drift and jitter of the gauges; none: nothing of them.
+    imperfections: Option<Imperfections>,
+    jitter: Gaussian,
+    /// Since the preparation, s.
+    time: f64,
 }
 
 impl PlatformRig {
@@ -91,6 +100,9 @@ impl PlatformRig {
             last_readings: [0.0; 6],
             force_sensor: ForceSensor::new(&noise.force, &nominal.force_range, seed),
             amplifiers: std::array::from_fn(|k| amplifier(&noise.channels, seed, k as u64)),
+            imperfections: Some(&nominal.imperfections).filter(|all| !all.is_none()).cloned(),
+            jitter: Gaussian::new(nominal.imperfections.timing_jitter_s, seed, JITTER_STREAM),
+            time: 0.0,
         }
     }
 
@@ -104,6 +116,7 @@ impl PlatformRig {
     /// Pre-cycle, rest and zero of the gauges, see [`PlatformPlant::prepare`].
     pub fn prepare(&mut self, preparation: &Preparation) {
         self.plant.prepare(preparation);
+        self.time = 0.0;
     }
 
     /// Draws the noise of the next `ticks` ticks now, so that later clones share it. The bits of a run do not change.
@@ -111,6 +124,7 @@ impl PlatformRig {
         self.gauges.iter_mut().for_each(|gauge| gauge.draw_ahead(ticks));
         self.amplifiers.iter_mut().for_each(|noise| noise.draw_ahead(ticks));
         self.force_sensor.draw_ahead(ticks);
+        self.jitter.draw_ahead(ticks);
     }
 
     /// The plant.
@@ -133,12 +147,25 @@ impl PlatformRig {
 
     /// Reads the six gauges, in m or V.
     pub fn read_gauges(&mut self) -> Six {
-        let pose = self.plant.seen();
+        let mut pose = self.plant.seen();
+        let mut offsets = None;
+        if let Some(imperfections) = &self.imperfections {
+            // Early or late by some µs: to first order in it.
+            let late = if imperfections.timing_jitter_s > 0.0 { self.jitter.draw() } else { 0.0 };
+            pose.iter_mut().zip(self.plant.rate()).for_each(|(pose, rate)| *pose += late * rate);
+            let mut added = imperfections.offsets(self.time + late);
+            if let Some([values, rates]) = self.plant.added() {
+                (0..6).for_each(|k| added[k] += values[k] + late * rates[k]);
+            }
+            offsets = Some(added);
+        }
         let distances = self.probes.distances(self.height, &pose, &rotation(angles(&pose)));
         let [low, high] = self.range;
         for k in 0..6 {
             // Drawn in any case, so that a fault does not shift the noise of a run.
-            let reading = self.gauges[k].read(distances[k] - self.rest_distances[k]);
+            let mut moved = distances[k] - self.rest_distances[k];
+            offsets.into_iter().for_each(|offsets| moved += offsets[k]);
+            let reading = self.gauges[k].read(moved);
             let held = if reading > high {
                 high
             } else if reading < low {
@@ -168,5 +195,6 @@ impl PlatformRig {
             *input += noise.draw() - self.lowest_voltage;
         }
         self.plant.hold(&inputs, interval);
+        self.time += interval;
     }
 }

@@ -75,10 +75,12 @@ impl Specimen {
             masses: self.nominal.masses(),
             stiffness: [self.nominal.axial_stiffness_n_per_m; 6],
             damping: [0.0; 6],
+            transverse: [0.0; 6],
         };
         let lowest = parameters.modes().0[0];
         parameters.stiffness = self.stiffness;
         parameters.damping = self.stiffness.map(|k| 2.0 * self.nominal.modal_damping / lowest * k);
+        parameters.transverse = self.stiffness.map(|k| self.nominal.imperfections.joint_stiffness_share * k);
         parameters
     }
 }

@@ -13,10 +13,12 @@
 //! them, is extrapolated linearly over the step. Second order; without that difference the step has no error at all.
 
 use super::contact::{Contact, WorkPart, Wrench};
-use super::geometry::{Geometry, angles, rate_matrix};
+use super::geometry::{Geometry, angles, point_jacobian, rate_matrix};
+use super::imperfections::{Cable, CableForce};
 use super::inertia::Masses;
 use super::linear::{
-    Matrix6, Six, apply, apply_transposed, congruent, exponential, generalised_eigen, inverse, product,
+    Matrix6, Six, add_congruent, apply, apply_transposed, congruent, dot, exponential, generalised_eigen, inverse,
+    product,
 };
 
 mod lanes;
@@ -37,6 +39,8 @@ pub struct StructureParameters {
     pub stiffness: Six,
     /// c_i: axial damping of each leg, N s/m.
     pub damping: Six,
+    /// Stiffness of each leg across its axis at its platform joint, N/m.
+    pub transverse: Six,
 }
 
 impl StructureParameters {
@@ -46,10 +50,29 @@ impl StructureParameters {
         self.masses.mass_matrix(&self.geometry, &[0.0; 6])
     }
 
-    /// K = Jᵀ diag(k) J at rest, in coordinates h.
+    /// K = Jᵀ diag(k) J at rest, in coordinates h, and that of the joints.
     #[must_use]
     pub fn stiffness_matrix(&self) -> Matrix6 {
-        congruent(&self.geometry.jacobian(&[0.0; 6]), &self.stiffness)
+        let axial = congruent(&self.geometry.jacobian(&[0.0; 6]), &self.stiffness);
+        self.joint_stiffness().map_or(axial, |joints| sum(&axial, &joints))
+    }
+
+    /// Σ J_iᵀ (I − s_i s_iᵀ) k_i J_i of the legs' joints at rest, with the Jacobian J_i of the joint, the direction s_i of the
+    /// leg and its transverse stiffness k_i; none if all are 0.
+    fn joint_stiffness(&self) -> Option<Matrix6> {
+        if self.transverse == [0.0; 6] {
+            return None;
+        }
+        let mut out = [[0.0; 6]; 6];
+        for (leg, stiffness) in self.transverse.iter().enumerate() {
+            let along = self.geometry.rest_leg(leg);
+            let square = dot(&along, &along);
+            let joint = point_jacobian(self.geometry.platform_joints[leg], &rate_matrix([0.0; 3]));
+            add_congruent(&mut out, &joint, &[*stiffness; 3]);
+            let axial = [apply_transposed(&joint, &along)];
+            add_congruent(&mut out, &axial, &[-stiffness / square]);
+        }
+        Some(out)
     }
 
     /// Undamped modes on the legs alone: angular frequencies in rising order, rad/s, and shapes as columns.
@@ -150,12 +173,14 @@ pub struct Structure {
     /// At rest: J, and stiffness and damping without contact.
     jacobian: Matrix6,
     stiffness: Matrix6,
-    weight_stiffness: Matrix6,
+    /// Part of it that is not of the legs' axes: of the weight, and of the joints.
+    beside: Matrix6,
     damping: Matrix6,
     contact: Option<Contact>,
     contact_stiffness: Matrix6,
     /// None is zero, and adds nothing.
     disturbance: Option<Wrench>,
+    cable: Option<CableForce>,
     step: f64,
     propagator: Propagator,
     state: [f64; STATES],
@@ -174,7 +199,11 @@ impl Structure {
         let mass = parameters.mass_matrix();
         let jacobian = parameters.geometry.jacobian(&[0.0; 6]);
         let weight_stiffness = parameters.weight_stiffness();
-        let stiffness = sum(&parameters.stiffness_matrix(), &weight_stiffness);
+        // That of the joints is linear, as the weight's is.
+        let joints = parameters.joint_stiffness();
+        let axial = congruent(&jacobian, &parameters.stiffness);
+        let beside = joints.map_or(weight_stiffness, |joints| sum(&weight_stiffness, &joints));
+        let stiffness = sum(&axial, &beside);
         let damping = congruent(&jacobian, &parameters.damping);
         Self {
             propagator: Propagator::new(&mass, &damping, &stiffness, step),
@@ -183,11 +212,12 @@ impl Structure {
             mass,
             jacobian,
             stiffness,
-            weight_stiffness,
+            beside,
             damping,
             contact: None,
             contact_stiffness: [[0.0; 6]; 6],
             disturbance: None,
+            cable: None,
             step,
             state: [0.0; STATES],
             displacement: [0.0; 6],
@@ -201,6 +231,11 @@ impl Structure {
     #[must_use]
     pub fn parameters(&self) -> &StructureParameters {
         &self.parameters
+    }
+
+    /// Attaches a cable, without force at the pose zero.
+    pub(super) fn attach(&mut self, cable: Cable) {
+        self.cable = Some(CableForce::new(cable));
     }
 
     /// Length of a step, s.
@@ -292,6 +327,7 @@ impl Structure {
         self.displacement = *displacement;
         self.drive = self.drive_of(displacement);
         self.earlier = None;
+        self.cable_follows();
         self.difference = self.force_difference();
     }
 
@@ -323,9 +359,9 @@ impl Structure {
         let exact = apply_transposed(&jacobian, &force);
         let mut linear = apply(&self.stiffness, &pose);
         let damped = apply(&self.damping, &rate);
-        let weight = apply(&self.weight_stiffness, &pose);
+        let beside = apply(&self.beside, &pose);
         for k in 0..6 {
-            linear[k] = self.drive[k] - linear[k] - damped[k] + weight[k];
+            linear[k] = self.drive[k] - linear[k] - damped[k] + beside[k];
         }
         let mut out: Six = std::array::from_fn(|k| exact[k] - linear[k]);
         if let Some(contact) = &self.contact {
@@ -341,7 +377,17 @@ impl Structure {
                 out[k] += pushed[k];
             }
         }
+        if let Some(cable) = &self.cable {
+            for (out, force) in out.iter_mut().zip(cable.force()) {
+                *out += force;
+            }
+        }
         out
+    }
+
+    fn cable_follows(&mut self) {
+        let [x, y, z, ..] = self.pose();
+        self.cable.iter_mut().for_each(|cable| cable.follow(&[x, y, z]));
     }
 
     /// One step, over which the free displacements go straight to `displacement` (m).
@@ -354,6 +400,7 @@ impl Structure {
         self.displacement = *displacement;
         self.drive = drive;
         self.earlier = Some(self.difference);
+        self.cable_follows();
         self.difference = self.force_difference();
     }
 }

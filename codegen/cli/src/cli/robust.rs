@@ -58,8 +58,8 @@ struct StudyArguments {
     /// Number of random machines, in addition to the corners.
     #[arg(long = "draws", value_name = "N", alias = "samples", default_value_t = 100, allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     draws: u32,
-    /// Range of an uncertainty, instead of that of [robust] or the default: `mass=5%`, `gain=0.9:1.1`, `delay_ticks=1`.
-    /// Names: mass, stiffness, damping, gain, hysteresis, creep, lag, noise (factors) and delay_ticks.
+    /// Range of an uncertainty, instead of that of [robust] or the default: `mass=5%`, `gain=0.9:1.1`, `delay_ticks=1`, `structure=1`.
+    /// Names: mass, stiffness, damping, gain, hysteresis, creep, lag, gauge_lag, noise (factors), delay_ticks, and structure (0 or 1).
     #[arg(long, value_name = "NAME=RANGE", value_parser = UserRange::parse)]
     vary: Vec<UserRange>,
     /// Trajectory: case-1 (default), case-2, machining, multisine or the name of a trajectory of the spec; without [control],

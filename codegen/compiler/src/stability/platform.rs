@@ -146,8 +146,11 @@ pub fn design(model: &Model, task: &TaskSpace, plant: &RestDynamics) -> Result<D
     let start = damping.as_ref().map(|(_, law)| &law.tuning);
     let combined = rule::combined(&corners, limit, given, start, ratios);
     let position = task.position_gains.as_ref().map_or_else(|| rule::alone(&corners, limit, ratios), gains);
-    refusal::check(model, task, &closed_loop, &combined, &position)?;
-    refusal::structure(model, task, &corners, [&combined, &position])?;
+    refusal::check(model, task, &corners, &combined, &position)?;
+    let effect = damping.as_ref().map(|(start, law)| {
+        let law = DampedLaw { tuning: combined, ..law.clone() };
+        damping::effect(&closed_loop, adapting, start, &law)
+    });
     let margins: Vec<ModeMargins> = ControlMode::all()
         .map(|law| {
             let tuning = if law.own_gains() { &position } else { &combined };
@@ -156,7 +159,7 @@ pub fn design(model: &Model, task: &TaskSpace, plant: &RestDynamics) -> Result<D
         .collect();
     let mut findings = refusal::thin(model, task, &closed_loop, &margins);
     findings.extend(task.design.as_ref().filter(|_| stored.is_none()).map(|_| refusal::stale(model)));
-    findings.extend(damping.as_ref().and_then(|(damping, _)| refusal::hardly_damped(model, &closed_loop, damping)));
+    findings.extend(effect.as_ref().and_then(|damping| refusal::hardly_damped(model, &closed_loop, damping)));
     let basis = &closed_loop.basis;
     Ok(Design {
         modes: core::array::from_fn(|i| Mode {
@@ -170,7 +173,7 @@ pub fn design(model: &Model, task: &TaskSpace, plant: &RestDynamics) -> Result<D
         notch: closed_loop.notch.clone(),
         stored: damping.as_ref().map(|(_, law)| law.to_store(digest, &combined)),
         searched,
-        damping: damping.map(|(damping, _)| damping),
+        damping: effect,
         structure_from: demand.from,
         bandwidth_limit: limit,
         combined,

@@ -8,7 +8,7 @@ use rand_chacha::rand_core::SeedableRng;
 use serde::{Deserialize, Serialize};
 
 use super::factors::{Factor, Factors};
-use crate::machine;
+use crate::machine::{self, StructureRange, StructureShares};
 use specgen_language::model::{Model, TaskSpace};
 use specgen_numerics::unit_interval as unit;
 
@@ -47,6 +47,9 @@ pub struct Deviation {
     pub delay_ticks: u32,
     /// Of each leg.
     pub legs: [LegDeviation; LEGS],
+    /// Structure of a random platform; none: a rigid platform on six ideal legs.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub structure: Option<StructureShares>,
 }
 
 impl Deviation {
@@ -68,6 +71,8 @@ impl Deviation {
             // The range check ensures an integer from 0 to 100.
             delay_ticks: of(Factor::DelayTicks) as u32,
             legs: [leg; LEGS],
+            // Random machines have one.
+            structure: None,
         }
     }
 
@@ -96,7 +101,14 @@ impl Deviation {
         for leg in &mut legs {
             leg.gauge_lag = low + (high - low) * unit(&mut rng);
         }
-        Self { mass, damping, noise, delay_ticks, legs }
+        // After everything else, for the same reason.
+        let structure = (factors.range(Factor::Structure)[1] > 0.0).then(|| StructureShares {
+            mode: std::array::from_fn(|_| unit(&mut rng)),
+            joints: unit(&mut rng),
+            mains: std::array::from_fn(|_| unit(&mut rng)),
+            drift: std::array::from_fn(|_| unit(&mut rng)),
+        });
+        Self { mass, damping, noise, delay_ticks, legs, structure }
     }
 
     /// Six legs with their own gauges. Mass and stiffness act through the resonance.
@@ -114,6 +126,7 @@ impl Deviation {
     #[must_use]
     pub fn specimen(&self, model: &Model, task: &TaskSpace, leg: &LegParameters) -> Specimen {
         let mut specimen = machine::specimen(model, task, leg, None);
+        let known = specimen.clone();
         for ((leg, stiffness), deviation) in specimen.legs.iter_mut().zip(&mut specimen.stiffness).zip(&self.legs) {
             *leg = self.leg_of(leg, deviation);
             *stiffness *= deviation.stiffness;
@@ -123,6 +136,9 @@ impl Deviation {
         nominal.platform_inertia_kg_m2.as_flattened_mut().iter_mut().for_each(|moment| *moment *= self.mass);
         nominal.modal_damping = damped(nominal.modal_damping, self.damping);
         nominal.force_noise.iter_mut().for_each(|noise| *noise *= self.noise);
+        if let Some(shares) = &self.structure {
+            shares.add_to(&mut nominal.imperfections, &StructureRange::of(&known));
+        }
         specimen
     }
 

@@ -128,7 +128,9 @@ fn corners(factors: &Factors, seed: u64) -> Vec<Member> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::machine::StructureRange;
     use crate::robust::factors::UserRange;
+    use host_sim::platform::{Imperfections, ModePlace, StructuralMode};
     use specgen_compiler::compile::compile;
 
     /// Factors of the spec of six legs, with `given` in place of its own.
@@ -176,6 +178,51 @@ mod tests {
             assert_eq!(Plan::alone(&factors, &member.name, 99).unwrap().members, [(*member).clone()]);
         }
         assert_ne!(plan, Plan::new(&factors, 300, 8));
+    }
+
+    #[test]
+    fn structure_is_drawn_after_everything_else_and_fills_its_ranges() {
+        let plain = Plan::new(&factors(&[]), 300, 7);
+        let structured = Plan::new(&factors(&["structure=1"]), 300, 7);
+        assert_eq!(Plan::new(&factors(&["structure=0"]), 300, 7), plain);
+        let range = StructureRange {
+            from_hz: 900.0,
+            to_hz: 5000.0,
+            damping_ratio: [0.01, 0.03],
+            kinds: vec![
+                (ModePlace::Leg(None), None),
+                (ModePlace::Gauge(None), Some(0.5)),
+                (ModePlace::Frame, Some(-0.1)),
+            ],
+        };
+        let mut modes = Vec::new();
+        assert_eq!(plain.members.len(), structured.members.len());
+        for (plain, structured) in plain.members.iter().zip(&structured.members) {
+            let bare = Deviation { structure: None, ..structured.deviation };
+            assert_eq!(plain, &Member { deviation: bare, ..structured.clone() });
+            assert_eq!(structured.deviation.structure.is_some(), structured.drawn);
+            let Some(shares) = structured.deviation.structure else { continue };
+            let mut machine = Imperfections::default();
+            shares.add_to(&mut machine, &range);
+            assert!(machine.joint_stiffness_share <= 0.05 && machine.mains[0].amplitude_m <= 2e-9, "{machine:?}");
+            assert!(machine.gauge_drift_m_per_s.iter().all(|drift| drift.abs() <= 20e-9), "{machine:?}");
+            assert!(machine.mains[0].gauge.is_some_and(|gauge| (1..=6).contains(&gauge)), "{machine:?}");
+            modes.extend(machine.modes);
+        }
+        assert_eq!(modes.len(), 300);
+        // 100 of each kind; the median of a logarithmic range is its geometric mean.
+        for (place, participation) in range.kinds {
+            let some = modes.iter().filter(|mode| mode.place == place && mode.participation == participation).count();
+            assert!((60..140).contains(&some), "{place}: {some}");
+        }
+        let median = |of: &dyn Fn(&StructuralMode) -> f64, low: f64, high: f64| {
+            let mut values: Vec<f64> = modes.iter().map(of).collect();
+            values.sort_by(f64::total_cmp);
+            assert!(values[0] >= low && values[0] < 1.1 * low && values[299] <= high && values[299] > 0.9 * high);
+            values[150] / (low * high).sqrt()
+        };
+        assert!((0.85..1.18).contains(&median(&|mode| mode.frequency_hz, 900.0, 5000.0)));
+        assert!((0.85..1.18).contains(&median(&|mode| mode.damping_ratio, 0.01, 0.03)));
     }
 
     #[test]

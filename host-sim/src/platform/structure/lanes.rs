@@ -48,9 +48,9 @@ fn lane(of: impl Fn(usize) -> f64) -> Lane {
 }
 
 impl StructureLanes {
-    /// Copies the structure, for steps of `step` (s); `lag` of each leg's amplifier, s. None if there is a disturbance.
+    /// Copies the structure, for steps of `step` (s); `lag` of each leg's amplifier, s. None if there is a disturbance or a cable.
     pub(in crate::platform) fn of(structure: &Structure, step: f64, lag: &Lane) -> Option<Self> {
-        if structure.disturbance.is_some() {
+        if structure.disturbance.is_some() || structure.cable.is_some() {
             return None;
         }
         let parameters = &structure.parameters;

@@ -40,7 +40,7 @@ impl Structure {
         let (pose, rate) = (self.pose(), self.rate());
         let momentum = apply(&self.mass, &rate);
         let extensions = self.parameters.geometry.extensions(&pose);
-        let weight = apply(&self.weight_stiffness, &pose);
+        let weight = apply(&self.beside, &pose);
         let mut twice = 0.0;
         for k in 0..6 {
             twice += pose[k] * weight[k];

@@ -49,7 +49,7 @@ const RINGING: f64 = 0.46;
 /// Penalties for an unstable corner, and for the depth of a border in the range of structural modes.
 const UNSTABLE: f64 = 1000.0;
 const DEPTH: f64 = 20.0;
-/// Share of the least ζ to which the sections alone and the estimates alone are designed: the loop of one mode is not the whole.
+/// Share of the least ζ to which the sections alone are designed: with gains, the loop of one mode is not the whole.
 const SPARE: f64 = 0.7;
 /// Evaluations of the cost: for the lowest mode, with gains and bandwidths, and for others.
 const EVALUATIONS: [usize; 2] = [3000, 2000];
@@ -233,7 +233,9 @@ pub(super) fn search(of: &ClosedLoop, adapting: Law, start: &Tuning, demand: &St
             let still = Feedback { gains: [0.0; 2], weights: [0.0; 2] };
             let still = family.controller(&still, section[0], Some(&section[1..]));
             let estimates = family.controller(&Feedback { gains: [0.0; 2], ..feedback }, section[0], None);
-            figures.cost(&rule) + family.unborne(&still) + family.unborne(&estimates)
+            figures.cost(&rule)
+                + family.unborne(&still, family.spare_range.as_ref())
+                + family.unborne(&estimates, family.bare_range.as_ref())
         };
         let best = minimise(&start_at, EVALUATIONS[usize::from(free < 4)], cost);
         let (factors, section) = decode(&best);
@@ -351,6 +353,7 @@ struct Family<'a> {
     /// With the distance of [`WITH_STRUCTURE`], and the border of stability itself.
     range: Option<FlexureRange>,
     bare_range: Option<FlexureRange>,
+    spare_range: Option<FlexureRange>,
     /// Indices of [`SLOW`] in the list of frequencies.
     slow: [usize; 3],
     /// Share of the band up to half the tick rate that each frequency represents.
@@ -461,7 +464,8 @@ impl<'a> Family<'a> {
             corners,
             suspects,
             range: demand.map(|demand| demand.range(1.0 / WITH_STRUCTURE, 1.0)),
-            bare_range: demand.map(|demand| demand.range(0.0, SPARE)),
+            bare_range: demand.map(|demand| demand.range(0.0, 0.98)),
+            spare_range: demand.map(|demand| demand.range(0.0, SPARE)),
             slow: slow.map(place),
             width,
         }
@@ -547,10 +551,10 @@ impl<'a> Family<'a> {
     }
 
     /// Penalty for what a loop does not bear: a corner, or a structural mode of the range.
-    fn unborne(&self, Controller { response, cancelled }: &Controller) -> f64 {
+    fn unborne(&self, Controller { response, cancelled }: &Controller, range: Option<&FlexureRange>) -> f64 {
         let mut penalty = 0.0;
         for plant in &self.corners {
-            let found = tolerance(plant, response, cancelled, &self.hertz, self.bare_range.as_ref());
+            let found = tolerance(plant, response, cancelled, &self.hertz, range);
             penalty += if found.stable { DEPTH * found.depth } else { UNSTABLE };
         }
         penalty

@@ -9,7 +9,7 @@ use super::margins::ModeMargins;
 use super::search::largest_stable;
 use super::structure::{Corners, MOST_DAMPING, StructureDemand};
 use super::{LARGEST_RADIUS, nominal_conditions, notch, worst_radius};
-use specgen_language::diagnostic::{Diagnostic, codes};
+use specgen_language::diagnostic::{Code, Diagnostic, codes};
 use specgen_language::model::{Model, TaskSpace};
 use specgen_runtime::{ControlMode, Law};
 
@@ -41,12 +41,13 @@ pub(super) fn no_modes(model: &Model) -> Diagnostic {
 pub(super) fn check(
     model: &Model,
     task: &TaskSpace,
-    closed_loop: &ClosedLoop,
+    corners: &Corners,
     combined: &Tuning,
     position: &Tuning,
 ) -> Result<(), Vec<Diagnostic>> {
+    let closed_loop = corners.closed_loop();
     let conditions = nominal_conditions(closed_loop, model.adaptation.gain_ratio);
-    let case = Case { model, closed_loop, conditions: &conditions };
+    let case = Case { model, corners, closed_loop, conditions: &conditions };
     if let Some(found) = case.interaction() {
         return Err(vec![found]);
     }
@@ -96,56 +97,6 @@ pub(super) fn too_low(model: &Model, closed_loop: &ClosedLoop, demand: &Structur
     })
 }
 
-/// Refuses control modes that are unstable with a structural mode which the spec permits.
-pub(super) fn structure(
-    model: &Model,
-    task: &TaskSpace,
-    corners: &Corners,
-    [combined, position]: [&Tuning; 2],
-) -> Result<(), Vec<Diagnostic>> {
-    let demand = corners.demand();
-    let mut worst: Option<(ControlMode, &'static str, [f64; 2])> = None;
-    // From where on every mode of the least damping is borne by all control modes.
-    let mut from = demand.from;
-    for law in ControlMode::all().filter(|law| LoopKind::of(*law) != LoopKind::Open) {
-        let tuning = if law.own_gains() { position } else { combined };
-        if corners.bears(law, tuning) {
-            continue;
-        }
-        let loci = corners.loci(law, tuning);
-        for flexure in &demand.flexures {
-            let border = corners.border(&loci, *flexure);
-            let found = border.worst(demand.from).unwrap_or([demand.from, 0.0]);
-            if worst.is_none_or(|(_, _, [_, most])| found[1] > most) {
-                worst = Some((law, border.kind, found));
-            }
-            while loci.demanded(*flexure, from) > demand.damping_ratio && from < 0.5 / corners.closed_loop().period {
-                from *= 1.02;
-            }
-        }
-    }
-    let Some((law, kind, [frequency, damping])) = worst else { return Ok(()) };
-    let damping = if damping > MOST_DAMPING { format!("more than {MOST_DAMPING}") } else { format!("{damping:.3}") };
-    let own = task.gains.is_some() || task.position_gains.is_some() || task.adaptation.is_some();
-    let fix = if own {
-        "leave out gains and bandwidths of your own, and the compiler designs them for this range"
-    } else {
-        "damp the structure, or measure its response (`specgen learn --excite`)"
-    };
-    Err(vec![Diagnostic::at(
-        &model.spans,
-        &["robust.structure.f0", "robust.structure", "gains", "position_gains", "adaptation.level_bandwidth", "control"],
-        codes::STRUCTURE_UNSTABLE,
-        format!(
-            "control mode {law} is unstable with a structural mode that may exist: a {kind} mode near {frequency:.0} Hz needs a \
-             damping ratio of {damping}, and the spec permits {} from {:.0} Hz on, at ±10 % of stiffness and gain, ±30 % of the \
-             amplifier's lag, one tick more",
-            demand.damping_ratio, demand.from
-        ),
-        format!("{fix}; or [robust.structure] f0 = \"{:.0} Hz\", if nothing is below it", libm::ceil(from * 1.01)),
-    )])
-}
-
 /// Warns about a stored design that was made from other values.
 pub(super) fn stale(model: &Model) -> Diagnostic {
     Diagnostic::at(
@@ -157,35 +108,57 @@ pub(super) fn stale(model: &Model) -> Diagnostic {
     )
 }
 
-/// A law and its spectral radius.
-type Unstable = (ControlMode, f64);
+/// Why a control mode is refused.
+struct Unstable {
+    code: Code,
+    message: String,
+}
 
 struct Case<'a> {
     model: &'a Model,
+    corners: &'a Corners<'a>,
     closed_loop: &'a ClosedLoop,
     conditions: &'a [Conditions],
 }
 
 impl Case<'_> {
-    /// The law with the largest radius, if that is too large.
+    /// The law with the largest radius, if that is too large; else the one that bears a structural mode least.
     fn unstable(&self, laws: &[ControlMode], tuning: &Tuning) -> Option<Unstable> {
-        let mut worst: Option<Unstable> = None;
-        for &law in laws {
-            let radius = worst_radius(self.closed_loop, law, tuning, self.conditions);
-            if radius > LARGEST_RADIUS && worst.is_none_or(|(_, largest)| radius > largest) {
-                worst = Some((law, radius));
-            }
+        let radius = |law: &ControlMode| (*law, worst_radius(self.closed_loop, *law, tuning, self.conditions));
+        let worst = laws.iter().map(radius).filter(|(_, radius)| *radius > LARGEST_RADIUS);
+        if let Some((law, radius)) = worst.reduce(|worst, one| if one.1 > worst.1 { one } else { worst }) {
+            return Some(Unstable { code: codes::UNSTABLE_PLATFORM, message: self.what(law, radius) });
         }
-        worst
+        let borne = laws.iter().filter(|law| LoopKind::of(**law) != LoopKind::Open && !self.corners.bears(**law, tuning));
+        let demands = borne.filter_map(|law| self.corners.most_demanding(*law, tuning).map(|found| (*law, found)));
+        let (law, (kind, [frequency, damping])) =
+            demands.reduce(|worst, one| if one.1.1[1] > worst.1.1[1] { one } else { worst })?;
+        Some(Unstable { code: codes::STRUCTURE_UNSTABLE, message: self.what_structure(law, kind, frequency, damping) })
+    }
+
+    fn is_stable(&self, laws: &[ControlMode], tuning: &Tuning) -> bool {
+        laws.iter().all(|law| worst_radius(self.closed_loop, *law, tuning, self.conditions) <= LARGEST_RADIUS)
+            && laws.iter().all(|law| LoopKind::of(*law) == LoopKind::Open || self.corners.bears(*law, tuning))
     }
 
     fn largest(&self, laws: &[ControlMode], tuning: impl Fn(f64) -> Tuning) -> Option<f64> {
-        largest_stable(LOWEST, 1.0, 1.2, |factor| self.unstable(laws, &tuning(factor)).is_none())
+        largest_stable(LOWEST, 1.0, 1.2, |factor| self.is_stable(laws, &tuning(factor)))
             .map(|limit| shown(SLACK * limit))
-            .filter(|factor| self.unstable(laws, &tuning(*factor)).is_none())
+            .filter(|factor| self.is_stable(laws, &tuning(*factor)))
     }
 
-    fn what(&self, (law, radius): Unstable) -> String {
+    fn what_structure(&self, law: ControlMode, kind: &str, frequency: f64, damping: f64) -> String {
+        let demand = self.corners.demand();
+        let needed = if damping > MOST_DAMPING { format!("above {MOST_DAMPING}") } else { format!("{damping:.3}") };
+        format!(
+            "control mode {law} is unstable with a structural mode that may exist: a {kind} mode near {frequency:.0} Hz needs a \
+             damping ratio of {needed}, but may have {} (any from {:.0} Hz on; at ±10 % of stiffness and gain, ±30 % of the amplifier's \
+             lag, one tick more)",
+            demand.damping_ratio, demand.from
+        )
+    }
+
+    fn what(&self, law: ControlMode, radius: f64) -> String {
         let touching = if self.closed_loop.environment == [0.0; 6] { "" } else { ", free or touching the work piece" };
         let [low, high] = self.model.adaptation.gain_ratio;
         let gauges = super::super::gauge_lag_text(self.closed_loop.gauge_lag);
@@ -205,7 +178,10 @@ impl Case<'_> {
     /// Checks the loop that the measured interaction force closes, whatever the gains.
     fn interaction(&self) -> Option<Diagnostic> {
         const BARE: [ControlMode; 1] = [ControlMode::F(Law::Invhys)];
-        let unstable = self.unstable(&BARE, &Tuning::NONE)?;
+        let radius = worst_radius(self.closed_loop, BARE[0], &Tuning::NONE, self.conditions);
+        if radius <= LARGEST_RADIUS {
+            return None;
+        }
         let stable_with = |factor: f64| {
             let softer = ClosedLoop {
                 environment: self.closed_loop.environment.map(|stiffness| stiffness * factor),
@@ -226,7 +202,7 @@ impl Case<'_> {
                 .to_owned(),
         };
         let keys = ["control.environment.stiffness", "control.interaction", "control.modal_damping", "control"];
-        Some(Diagnostic::at(&self.model.spans, &keys, codes::UNSTABLE_PLATFORM, self.what(unstable), help))
+        Some(Diagnostic::at(&self.model.spans, &keys, codes::UNSTABLE_PLATFORM, self.what(BARE[0], radius), help))
     }
 
     fn bandwidths(&self, task: &TaskSpace, unstable: Unstable, tuning: &Tuning, largest: Option<f64>) -> Diagnostic {
@@ -249,7 +225,7 @@ impl Case<'_> {
                 )
             },
         );
-        Diagnostic::at(&self.model.spans, &keys, codes::UNSTABLE_PLATFORM, self.what(unstable), help)
+        Diagnostic::at(&self.model.spans, &keys, unstable.code, unstable.message, help)
     }
 
     fn gains(&self, table: &str, given: bool, unstable: Unstable, tuning: &Tuning, largest: Option<f64>) -> Diagnostic {
@@ -280,11 +256,11 @@ impl Case<'_> {
                 )
             },
         );
-        Diagnostic::at(&self.model.spans, &keys, codes::UNSTABLE_PLATFORM, self.what(unstable), help)
+        Diagnostic::at(&self.model.spans, &keys, unstable.code, unstable.message, help)
     }
 
     fn no_tuning(&self, unstable: Unstable) -> Diagnostic {
-        let message = format!("the tuning rule found no stable values: {}", self.what(unstable));
+        let message = format!("the tuning rule found no stable values: {}", unstable.message);
         Diagnostic::at(
             &self.model.spans,
             &["control", "timing.period"],
@@ -297,7 +273,7 @@ impl Case<'_> {
     fn nothing_helps(&self) -> String {
         let notch = if self.closed_loop.notch.is_some() { "" } else { "a notch (control.notch_damping), " };
         format!(
-            "no smaller value of these alone is stable: {notch}a shorter timing.period, more control.modal_damping or a \
+            "no smaller value of these alone is stable: a higher [robust.structure] f0 if no mode is below it, {notch}a shorter timing.period, more control.modal_damping or a \
              narrower adaptation.gain_ratio would help"
         )
     }

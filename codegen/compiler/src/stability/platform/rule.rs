@@ -6,7 +6,7 @@
 //! damping, free and touching the declared work piece, and with every structural mode that the spec demands.
 
 use super::closed_loop::{ClosedLoop, Conditions};
-use super::damping::{self, ActiveDamping, DampedLaw};
+use super::damping::{self, DampedLaw};
 use super::structure::{Corners, StructureDemand};
 use super::law::{LoopKind, Tuning};
 use super::search::largest_stable;
@@ -83,20 +83,20 @@ fn start(closed_loop: &ClosedLoop, limit: f64) -> Tuning {
     }
 }
 
-/// Adds active damping and its notch to the loop: the `stored` law of a spec, or a new design. Returns it with its effect.
+/// Adds active damping and its notch to the loop: the `stored` law of a spec, or a new design. Returns the rule's start values and
+/// the law.
 pub(super) fn damped(
     closed_loop: &mut ClosedLoop,
     limit: f64,
     adapting: Law,
     stored: Option<DampedLaw>,
     demand: &StructureDemand,
-) -> (ActiveDamping, DampedLaw) {
+) -> (Tuning, DampedLaw) {
     let start = start(closed_loop, limit);
     let law = stored.unwrap_or_else(|| damping::search(closed_loop, adapting, &start, demand));
-    let effect = damping::effect(closed_loop, adapting, &start, &law);
     closed_loop.active_damping = Some(law.sections);
     closed_loop.notch = damping::notch_of(closed_loop, &law.notch_damping);
-    (effect, law)
+    (start, law)
 }
 
 /// Gains of P alone.

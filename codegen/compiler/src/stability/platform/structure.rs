@@ -244,10 +244,21 @@ impl<'a> Corners<'a> {
     /// Whether a control mode is stable with every structural mode that it must bear, by the border of stability.
     pub(super) fn bears(&self, law: ControlMode, tuning: &Tuning) -> bool {
         let loci = self.loci(law, tuning);
-        self.demand.flexures.iter().all(|flexure| loci.demanded(*flexure, self.demand.from) <= self.demand.damping_ratio)
+        self.demand.flexures.iter().all(|flexure| loci.demanded(*flexure, self.demand.from)[1] <= self.demand.damping_ratio)
             && self.demand.suspects.iter().all(|one| {
                 self.border(&loci, one.flexure).at(one.frequency / TAU) < one.damping_ratio
             })
+    }
+
+    /// The kind, frequency (Hz) and damping ratio of the mode that a control mode bears least, at a suspected mode or in the range.
+    pub(super) fn most_demanding(&self, law: ControlMode, tuning: &Tuning) -> Option<(&'static str, [f64; 2])> {
+        let loci = self.loci(law, tuning);
+        let suspects = self.demand.suspects.iter().map(|one| {
+            let frequency = one.frequency / TAU;
+            (kind_of(one.flexure), [frequency, self.border(&loci, one.flexure).at(frequency)])
+        });
+        let ranges = self.demand.flexures.iter().map(|flexure| (kind_of(*flexure), loci.demanded(*flexure, self.demand.from)));
+        ranges.chain(suspects).reduce(|most, one| if one.1[1] > most.1[1] { one } else { most })
     }
 
     /// The border of a control mode for one more structural mode.
@@ -269,13 +280,13 @@ impl<'a> Corners<'a> {
 }
 
 impl Loci {
-    /// The damping ratio that a mode from `from` (Hz) on needs, up to the most that a structural mode is taken to have.
-    pub(super) fn demanded(&self, flexure: Flexure, from: f64) -> f64 {
+    /// Of the modes from `from` (Hz) on, the one that needs the most damping: its frequency, Hz, and ζ.
+    pub(super) fn demanded(&self, flexure: Flexure, from: f64) -> [f64; 2] {
         let needed = self.0.iter().filter_map(|(frequency, value)| {
             let [factor, damping] = flexure.border([value.re, value.im], [0.0; 2])?;
-            (factor * frequency >= from).then_some(damping)
+            (factor * frequency >= from).then_some([factor * frequency, damping])
         });
-        needed.fold(0.0, |most, damping| if damping > most { damping } else { most })
+        needed.fold([from, 0.0], |most, one| if one[1] > most[1] { one } else { most })
     }
 }
 
