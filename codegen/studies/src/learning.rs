@@ -9,6 +9,7 @@
 //! frequency at which this holds, with a margin, for every machine within the intervals of `[robust]`. All computation happens between
 //! passes; a tick only plays a table.
 
+mod coherence;
 mod convergence;
 mod excitation;
 mod gain;
@@ -32,7 +33,7 @@ pub use passes::{
     Ending, LearnError, Learner, LearningResult, Pass, RepeatableMachine, course, held, learn, translation_nm,
 };
 pub use plan::Plan;
-pub use refusal::{NOWHERE, takes_correction};
+pub use refusal::{NOWHERE, larger_limit, largest_correction, takes_correction};
 pub use response::{Bin, Response};
 pub use table::{Table, TableError, knots};
 pub use update::Update;

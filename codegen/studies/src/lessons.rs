@@ -25,7 +25,8 @@ use crate::controllers::at_run_time;
 use crate::factors::{Factors, UserRange};
 use crate::learning::{
     Convergence, Ending, LearnError, Learnable, Learner, LearningResult, Motion, NOWHERE, Pass, Plan,
-    RepeatableMachine, Response, Table, Update, course, knots, learn, takes_correction,
+    RepeatableMachine, Response, Table, Update, course, knots, larger_limit, largest_correction, learn,
+    takes_correction,
 };
 use crate::machine::{PlantOptions, run_failure};
 use crate::trajectory::{self, NamedTrajectory};
@@ -35,6 +36,8 @@ const UNKNOWN: &str =
     "the measured response is too uncertain for learning; measure it along a longer motion with --excite";
 /// Time limit for reaching the bias pose, s.
 const ARMING: f64 = 60.0;
+/// An error below this share of the one that was reached is worth measuring the response.
+const WORTH: f64 = 0.8;
 
 /// Options of `learn`.
 #[derive(Debug)]
@@ -301,24 +304,37 @@ fn keep(
         motion: motion_name.clone(),
         machine: machine_name.clone(),
         convergence: convergence.clone(),
+        help: help(options, study, &learned),
         learned,
-        help: help(options, study),
     })
 }
 
-/// How to learn up to the requested bandwidth, if not every machine within the intervals would converge there.
-fn help(options: &Options, study: &Study) -> Option<String> {
+/// What would improve the result: a larger limit, the machine's own response, or damping.
+fn help(options: &Options, study: &Study, learned: &LearningResult) -> Vec<String> {
     let Study { compiled, convergence, .. } = study;
     let [_, highest] = convergence.band;
-    let damped = compiled.model.task_space.as_ref().is_some_and(|task| task.active_damping);
-    let mend = match (damped, convergence.measured) {
-        // The device's capacity may be the limit, and it cannot use a measured response.
-        _ if options.on_device.is_some() => return None,
-        (false, _) => "damp the modes: `control.active_damping = true`",
-        (true, false) => "measure the response: --excite, then --response",
-        (true, true) => return None,
-    };
-    (highest < options.bandwidth).then(|| format!("to learn above {highest:.0} Hz, {mend}"))
+    let task = compiled.model.task_space.as_ref();
+    let mut help = Vec::new();
+    if let Some((sufficient, limit)) = learned.sufficient_nm.zip(task.and_then(|task| task.correction)) {
+        help.push(larger_limit([sufficient * 1e-9, limit, largest_correction(&compiled.model)]));
+    }
+    // The device cannot use a measured response, and its capacity may be the limit.
+    if options.on_device.is_some() {
+        return help;
+    }
+    if !task.is_some_and(|task| task.active_damping) && highest < options.bandwidth {
+        help.push(format!("to learn above {highest:.0} Hz, damp the modes: `control.active_damping = true`"));
+    }
+    let left = learned.passes[learned.best].measured_nm;
+    let stopped = matches!(learned.ending, Ending::Growth | Ending::NoGain);
+    let expected = learned.expected_nm.filter(|expected| *expected < WORTH * left);
+    if let Some(expected) = expected.filter(|_| !convergence.measured && (stopped || highest < options.bandwidth)) {
+        help.push(format!(
+            "measure the response with --excite FILE, then learn with --response FILE: about {expected:.1} nm by the gauges instead of \
+             {left:.1}"
+        ));
+    }
+    help
 }
 
 fn gate(error: impl Into<LearnError>) -> Failure {
@@ -348,7 +364,7 @@ fn begin(
     let period = compiled.model.timing.period;
     let spacing = convergence.spacing(period);
     if options.prepare {
-        return Ok((knots(&Update::prepared(learnable, motion, convergence.band[1]), spacing), spacing));
+        return Ok((knots(&Update::prepared(learnable, motion, convergence.band[1], &[]), spacing), spacing));
     }
     let Some(path) = &options.from else { return Ok((Vec::new(), spacing)) };
     let table = Table::of_file(path).map_err(|error| Failure::Gate(format!("{}: {error}", path.display())))?;
@@ -385,9 +401,9 @@ struct Lesson {
     convergence: Convergence,
     #[serde(flatten)]
     learned: LearningResult,
-    /// How to learn to higher frequencies, if they were requested.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    help: Option<String>,
+    /// What would improve the result.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    help: Vec<String>,
 }
 
 impl Outcome for Lesson {
@@ -435,7 +451,7 @@ impl Outcome for Lesson {
         for line in kept(learned) {
             let _ = writeln!(text, "  {line}");
         }
-        if let Some(help) = help {
+        for help in help {
             let _ = writeln!(text, "help: {help}");
         }
         text.lines().map(|line| format!("{}\n", line.trim_end())).collect()

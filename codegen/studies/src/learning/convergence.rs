@@ -55,6 +55,9 @@ pub struct Convergence {
     pub at: f64,
     /// Whether T was measured: then the bound covers its uncertainty, else every machine within the intervals.
     pub measured: bool,
+    /// Highest frequency requested, Hz.
+    #[serde(skip)]
+    pub(super) wish: f64,
     /// Lowest frequency of the measured T, Hz; infinite if none was measured.
     #[serde(skip)]
     pub(super) edge: f64,
@@ -101,8 +104,16 @@ impl Convergence {
         let mut shares: Vec<[f64; 2]> = vec![[0.0, 0.0]];
         shares.extend(bins.iter().enumerate().map(|(k, bin)| [bin.hertz, f64::from(u8::from(learned(k)))]));
         shares.push([JUST_BEYOND * end[0], 0.0]);
-        let mut found =
-            Self { band: [low, high], radius: 0.0, at: 0.0, measured: true, edge: low, bounds: Vec::new(), shares };
+        let mut found = Self {
+            band: [low, high],
+            radius: 0.0,
+            at: 0.0,
+            measured: true,
+            wish,
+            edge: low,
+            bounds: Vec::new(),
+            shares,
+        };
         for (k, bin) in bins.iter().enumerate() {
             found.meet(bin.hertz, radius(k));
         }
@@ -121,9 +132,12 @@ impl Convergence {
     /// |Q| at a frequency, Hz.
     #[must_use]
     pub fn passed(&self, hertz: f64) -> f64 {
-        let [low, high] = self.band;
-        let below = if low > 0.0 { 1.0 / (1.0 + libm::pow(low / hertz, ORDERS[1])) } else { 1.0 };
-        below * low_pass(hertz, high)
+        passed(self.band, hertz)
+    }
+
+    /// |Q| at a frequency (Hz) if learning reached the requested one.
+    pub(super) fn wished(&self, hertz: f64) -> f64 {
+        passed([self.band[0], self.wish], hertz)
     }
 
     /// The share of T⁻¹ used at a frequency, Hz.
@@ -225,6 +239,7 @@ impl Learnable {
             radius: 0.0,
             at: 0.0,
             measured: false,
+            wish,
             edge: f64::INFINITY,
             bounds: Vec::new(),
             shares,
@@ -249,7 +264,8 @@ impl Learnable {
         let band = [if first == 0 { 0.0 } else { frequencies[first] }, found.band[1]];
         let shares = slow.chain(fast).collect();
         let (edge, bounds) = (found.edge, found.bounds);
-        let mut whole = Convergence { band, radius: 0.0, at: 0.0, measured: true, edge, bounds: Vec::new(), shares };
+        let mut whole =
+            Convergence { band, radius: 0.0, at: 0.0, measured: true, wish, edge, bounds: Vec::new(), shares };
         for (hertz, radius) in frequencies.iter().zip(&radii) {
             whole.meet(*hertz, *radius);
         }
@@ -348,6 +364,12 @@ pub(super) fn spacing(bandwidth: f64, period: f64) -> u32 {
 pub(super) fn highest(bandwidth: f64, period: f64) -> f64 {
     let (cut, fastest) = (3.2 * bandwidth, 0.45 / period);
     if cut < fastest { cut } else { fastest }
+}
+
+/// |Q| of a band (Hz) at a frequency, Hz.
+fn passed([low, high]: [f64; 2], hertz: f64) -> f64 {
+    let below = if low > 0.0 { 1.0 / (1.0 + libm::pow(low / hertz, ORDERS[1])) } else { 1.0 };
+    below * low_pass(hertz, high)
 }
 
 /// |Q| at its upper end.

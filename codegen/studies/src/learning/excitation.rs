@@ -43,7 +43,7 @@ const WITHIN: f64 = 0.5;
 /// Where the loop passes little, the sweep is larger: twice as large at the first frequency, Hz, and in inverse proportion down to the second.
 const SLOW: [f64; 2] = [100.0, 10.0];
 /// Shortest time in which a correction may rise from zero to its limit, s.
-const ONSET: f64 = 1e-3;
+pub(super) const ONSET: f64 = 1e-3;
 /// Fade-in and fade-out time of a sweep, s.
 const FADE: f64 = 5e-3;
 /// Width of a bin, Hz, and its minimum relative to the frequency: half of the narrowest resonance that feedback leaves on usual platforms.

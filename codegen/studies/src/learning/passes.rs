@@ -12,6 +12,8 @@ use serde::Serialize;
 use specgen_runtime::pass::{Course, Player};
 use specgen_runtime::playback::{self, Knot, UNIT};
 
+use super::coherence::Coherence;
+use super::excitation::ONSET;
 use super::gain::{Judge, Score, Verdict};
 use super::motion::Motion;
 use super::observation::PassObservation;
@@ -29,6 +31,8 @@ const LEGS: u32 = 0x3f;
 const CORRECTION_LIMITED: u32 = 1 << 20;
 /// The error counts as growing above this multiple of the smallest one.
 const GROWS: f64 = 1.5;
+/// Headroom of a sufficient limit: later passes change a correction further.
+const HEADROOM: f64 = 1.2;
 
 /// Reasons learning is refused.
 #[derive(Debug)]
@@ -84,24 +88,75 @@ pub enum Learner<'a> {
     Device(&'a Plan),
 }
 
-impl Learner<'_> {
-    /// The correction of the next pass, from the one `played` and the observation `seen`.
+impl<'a> Learner<'a> {
+    /// Begins to learn, from two passes under the same correction.
+    fn session(self, equal: [&PassObservation; 2], motion: &Motion) -> Session<'a> {
+        match self {
+            Self::Host(update) => Session::Host(update, update.coherence(equal.map(|seen| errors(seen, motion)))),
+            Self::Device(plan) => Session::Device(plan),
+        }
+    }
+}
+
+/// A learner with what it knows of the noise.
+enum Session<'a> {
+    Host(&'a Update, Coherence),
+    Device(&'a Plan),
+}
+
+impl Session<'_> {
+    /// [`LearningResult::expected_nm`] of a pass.
+    fn expected_nm(&self, seen: &PassObservation, motion: &Motion) -> Option<f64> {
+        match self {
+            Self::Host(update, coherence) => {
+                Some(measured_nm(&update.remainder(errors(seen, motion), coherence), motion))
+            }
+            Self::Device(_) => None,
+        }
+    }
+
+    /// The correction of the next pass, from the one `played` and the observations of passes under it, the last one `seen`.
     fn next(
-        self,
+        &mut self,
         machine: &mut dyn RepeatableMachine,
         motion: &Motion,
-        (played, seen): (&[Knot], &PassObservation),
+        (played, before, seen): (&[Knot], Option<PassObservation>, &PassObservation),
         spacing: u32,
     ) -> Result<Vec<Knot>, LearnError> {
         match self {
             Self::Device(plan) => machine.next(plan, played, seen),
-            Self::Host(update) => {
-                let ticks = 0..motion.corrected as u32;
-                let correction: Vec<[f64; 6]> = ticks.map(|tick| playback::at(played, spacing, tick)).collect();
-                Ok(knots(&update.next(&correction, &seen.measured[..motion.corrected]), spacing))
+            Self::Host(update, coherence) => {
+                let errors: Vec<_> = before.iter().chain([seen]).map(|seen| errors(seen, motion)).collect();
+                Ok(knots(&update.next(&given(played, motion, spacing), &errors, coherence), spacing))
             }
         }
     }
+}
+
+/// What a pass shows where a correction may be.
+fn errors<'a>(seen: &'a PassObservation, motion: &Motion) -> &'a [[f64; 6]] {
+    &seen.measured[..motion.corrected]
+}
+
+/// The correction that knots give, tick by tick, m and rad.
+fn given(played: &[Knot], motion: &Motion, spacing: u32) -> Vec<[f64; 6]> {
+    (0..motion.corrected as u32).map(|tick| playback::at(played, spacing, tick)).collect()
+}
+
+/// The limit (m) within which these knots are played as they are, with headroom.
+fn sufficient(played: &[Knot], motion: &Motion, spacing: u32) -> f64 {
+    let arms = [1.0, motion.radius];
+    let correction = given(played, motion, spacing);
+    // A limit also bounds the rate: it is reached in the onset time at the fastest.
+    let rates = correction
+        .windows(2)
+        .map(|pair| std::array::from_fn(|axis| (pair[1][axis] - pair[0][axis]) * ONSET / motion.interval));
+    let largest = correction
+        .iter()
+        .copied()
+        .chain(rates)
+        .flat_map(|c: [f64; 6]| (0..6).map(move |axis| (c[axis] * arms[axis / 3]).abs()));
+    HEADROOM * largest.fold(0.0, |most, value| if value > most { value } else { most })
 }
 
 /// A machine that can repeat a motion.
@@ -190,23 +245,16 @@ pub struct Pass {
 
 impl Pass {
     fn of(seen: &PassObservation, motion: &Motion) -> Result<Self, LearnError> {
-        let Motion { scored, radius, interval, .. } = motion;
+        let Motion { scored, interval, .. } = motion;
         let shown = seen.real.len().min(seen.measured.len()).min(scored.end);
         let coverage = Coverage::new(shown.saturating_sub(scored.start), scored.len(), *interval);
         if !coverage.is_whole() {
             return Err(RunError::EndedEarly { coverage, status: seen.status }.into());
         }
-        let rms = |errors: &[[f64; 6]], weights: [f64; 2]| {
-            let sum: f64 = errors[scored.clone()]
-                .iter()
-                .map(|error| (0..6).map(|axis| weights[axis / 3] * error[axis] * error[axis]).sum::<f64>())
-                .sum();
-            libm::sqrt(sum / scored.len() as f64) * 1e9
-        };
         Ok(Self {
-            translation_nm: rms(&seen.real, [1.0, 0.0]),
-            orientation_nrad: rms(&seen.real, [0.0, 1.0]),
-            measured_nm: rms(&seen.measured, [1.0, radius * radius]),
+            translation_nm: rms(&seen.real, motion, [1.0, 0.0]),
+            orientation_nrad: rms(&seen.real, motion, [0.0, 1.0]),
+            measured_nm: measured_nm(&seen.measured, motion),
             status: seen.status,
             coverage,
         })
@@ -217,6 +265,20 @@ impl Pass {
     pub fn limited(&self) -> bool {
         self.status & CORRECTION_LIMITED != 0
     }
+}
+
+/// Rms over the motion itself of weighted translations and angles, nm or nrad.
+fn rms(errors: &[[f64; 6]], motion: &Motion, weights: [f64; 2]) -> f64 {
+    let sum: f64 = errors[motion.scored.clone()]
+        .iter()
+        .map(|error| (0..6).map(|axis| weights[axis / 3] * error[axis] * error[axis]).sum::<f64>())
+        .sum();
+    libm::sqrt(sum / motion.scored.len() as f64) * 1e9
+}
+
+/// The criterion [`Pass::measured_nm`].
+fn measured_nm(errors: &[[f64; 6]], motion: &Motion) -> f64 {
+    rms(errors, motion, [1.0, motion.radius * motion.radius])
 }
 
 /// Why learning ended.
@@ -247,6 +309,11 @@ pub struct LearningResult {
     pub knots: Vec<Knot>,
     /// Difference of two passes under the same correction in [`Pass::measured_nm`], nm; `None` if there was nothing to learn from.
     pub noise_nm: Option<f64>,
+    /// [`Pass::measured_nm`] that learning with the machine's own response, up to the requested frequency, would leave of the first pass,
+    /// nm; `None` if the device learns.
+    pub expected_nm: Option<f64>,
+    /// If a correction was limited: the limit (`control.correction`) that the first one needs, with headroom, nm.
+    pub sufficient_nm: Option<f64>,
     /// Why learning ended.
     pub ending: Ending,
 }
@@ -279,25 +346,31 @@ pub fn learn(
     let mut played: Vec<Knot> = begin.to_vec();
     let mut equal = || followed(machine.pass(motion, begin, spacing)?);
     equal()?;
-    let repeated = if count > 0 { Some(Score::of(&equal()?, motion)) } else { None };
+    let mut before = if count > 0 { Some(equal()?) } else { None };
     let mut seen = equal()?;
-    let mut judge = repeated.map(|before| Judge::new(Score::of(&seen, motion), &before));
+    let first = Pass::of(&seen, motion)?;
+    let mut session = before.as_ref().map(|before| {
+        let judge = Judge::new(Score::of(&seen, motion), &Score::of(before, motion));
+        (judge, learner.session([before, &seen], motion))
+    });
     let mut learned = LearningResult {
-        passes: vec![Pass::of(&seen, motion)?],
+        passes: vec![first],
         best: 0,
         knots: played.clone(),
-        noise_nm: judge.as_ref().map(Judge::noise_nm),
+        noise_nm: session.as_ref().map(|(judge, _)| judge.noise_nm()),
+        expected_nm: session.as_ref().and_then(|(_, session)| session.expected_nm(&seen, motion)),
+        sufficient_nm: None,
         ending: Ending::AllPasses,
     };
     let mut number = 0;
-    let mut go_on = watch(0, &learned.passes[0]);
-    while number < count {
+    let mut go_on = watch(0, &first);
+    while let Some((judge, session)) = session.as_mut().filter(|_| number < count) {
         if go_on.is_break() {
             learned.ending = Ending::Interruption;
             break;
         }
         number += 1;
-        let made = learner.next(machine, motion, (&played, &seen), spacing);
+        let made = session.next(machine, motion, (&played, before.take(), &seen), spacing);
         let passed = made.and_then(|made| {
             played = made;
             followed(machine.pass(motion, &played, spacing)?)
@@ -311,10 +384,13 @@ pub fn learn(
             passed => passed?,
         };
         let pass = Pass::of(&seen, motion)?;
+        if pass.limited() && learned.sufficient_nm.is_none() {
+            learned.sufficient_nm = Some(1e9 * sufficient(&played, motion, spacing));
+        }
         let least = learned.passes[learned.best].measured_nm;
         learned.passes.push(pass);
         go_on = watch(number, &pass);
-        let found = judge.as_mut().map_or(Verdict::Stop, |judge| judge.judge(Score::of(&seen, motion)));
+        let found = judge.judge(Score::of(&seen, motion));
         if found == Verdict::Keep {
             (learned.best, learned.knots) = (number, played.clone());
         } else if found == Verdict::Stop {
