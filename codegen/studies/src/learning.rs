@@ -21,11 +21,12 @@ mod passes;
 mod plan;
 mod refusal;
 mod response;
+mod structure;
 mod table;
 mod update;
 
 pub use convergence::{Convergence, LARGEST_RADIUS, Learnable};
-pub use excitation::{Excitation, PASSES};
+pub use excitation::{Excitation, PASSES, SweepSpectra};
 pub use modes::ModeMeasurement;
 pub use motion::Motion;
 pub use observation::PassObservation;
@@ -35,5 +36,6 @@ pub use passes::{
 pub use plan::Plan;
 pub use refusal::{NOWHERE, larger_limit, largest_correction, takes_correction};
 pub use response::{Bin, Response};
+pub use structure::{Place, StructuralMode, Structure};
 pub use table::{Table, TableError, knots};
 pub use update::Update;

@@ -60,7 +60,8 @@ fn learned(
 
 fn measured(machine: &mut dyn RepeatableMachine, learnable: &Learnable) -> Response {
     let excitation = Excitation::new(learnable, &motion(), WISH, LIMITS);
-    excitation.measure(machine, learnable, &motion(), ["digest", "machine"], |_| ControlFlow::Continue(())).unwrap()
+    let spectra = excitation.measure(machine, learnable, &motion(), |_| ControlFlow::Continue(())).unwrap();
+    spectra.response(["digest", "machine"])
 }
 
 #[test]

@@ -112,15 +112,23 @@ impl Outcome for IdentificationResult<Estimate<FrequencyResponse>> {
         );
         let _ = write!(
             text,
-            "spec lines:\n[actuator]\nresonance = \"{:.1} Hz\"  # static gain here: {:.5} um/V for small amplitude, below that of a large loop\ndamping_ratio = {:.4}\n[amplifier]\nlag = \"{:.4} ms\"\n{}{files}",
+            "spec lines:\n[actuator]\nresonance = \"{:.1} Hz\"  # static gain here: {:.5} um/V for small amplitude, below that of a large loop\ndamping_ratio = {:.4}\n[amplifier]\nlag = \"{:.4} ms\"\n{}with [control], [actuator] counts for every leg; for the leg of this record alone, write instead:\n{}{files}",
             f.resonance.value,
             f.gain.value * 1e6,
             f.damping_ratio.value,
             f.lag.value * 1e3,
-            measured.text()
+            measured.text(),
+            mode_lines(f.resonance.value, f.damping_ratio.value),
         );
         text
     }
+}
+
+/// A `[[mode]]` in series with a leg; frequency in Hz.
+fn mode_lines(frequency: f64, damping_ratio: f64) -> String {
+    format!(
+        "[[mode]]\nfrequency = \"{frequency:.1} Hz\"\ndamping_ratio = {damping_ratio:.4}\nat = \"leg 1\"  # the number of the leg\n"
+    )
 }
 
 /// `specgen identify gauge`: reads, calibrates, writes the `table`, draws and shows the result.

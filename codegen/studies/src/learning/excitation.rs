@@ -42,12 +42,16 @@ const OVER_NOISE: f64 = 50.0;
 const WITHIN: f64 = 0.5;
 /// Where the loop passes little, the sweep is larger: twice as large at the first frequency, Hz, and in inverse proportion down to the second.
 const SLOW: [f64; 2] = [100.0, 10.0];
+/// Frequency above which the sweep is limited by the rate of a correction and falls in inverse proportion, Hz.
+const FAST: f64 = 1280.0;
 /// Shortest time in which a correction may rise from zero to its limit, s.
 pub(super) const ONSET: f64 = 1e-3;
 /// Fade-in and fade-out time of a sweep, s.
 const FADE: f64 = 5e-3;
 /// Width of a bin, Hz, and its minimum relative to the frequency: half of the narrowest resonance that feedback leaves on usual platforms.
 const WIDTH: [f64; 2] = [2.5, 0.02];
+/// The same for modes of a structure.
+const NARROW: [f64; 2] = [2.5, 0.005];
 /// Significant digits in a file.
 const DIGITS: usize = 5;
 
@@ -72,7 +76,8 @@ impl Excitation {
         let [wish, fastest] = [BEYOND * bandwidth, RATE / (f64::from(spacing) * period)];
         let band = [1.0 / time, if wish < fastest { wish } else { fastest }];
         // Limited by its rate at the end and by its size at the beginning.
-        let rate = limit / (TAU * (band[1] + SLOW[0]) * ONSET);
+        let fastest = if band[1] < FAST { band[1] } else { FAST };
+        let rate = limit / (TAU * (fastest + SLOW[0]) * ONSET);
         let size = limit / larger(0.0);
         let bearable = WITHIN * if size < rate { size } else { rate };
         let wanted = OVER_NOISE * noise;
@@ -100,8 +105,7 @@ impl Excitation {
         Self { passes, band, amplitude, spacing }
     }
 
-    /// Runs the passes, after one that is discarded, and returns T with its standard error; `names` are the digest of the spec and the machine.
-    /// `watch` is called after each pass and may stop.
+    /// Runs the passes, after one that is discarded. `watch` is called before each pass and may stop.
     ///
     /// # Errors
     /// If the machine fails to make a pass, limits restrict the excitation, or it was stopped.
@@ -110,9 +114,8 @@ impl Excitation {
         machine: &mut dyn RepeatableMachine,
         learnable: &Learnable,
         motion: &Motion,
-        names: [&str; 2],
         mut watch: impl FnMut(usize) -> ControlFlow<()>,
-    ) -> Result<Response, LearnError> {
+    ) -> Result<SweepSpectra, LearnError> {
         let period = learnable.closed_loop.period;
         let to_modal = &learnable.closed_loop.basis.to_modal;
         let length = (2 * motion.corrected).next_power_of_two();
@@ -137,16 +140,51 @@ impl Excitation {
             let shown = seen.measured[..motion.corrected].iter().map(|error| error.map(|axis| -axis));
             pairs.push([spectra(&mut { given }), spectra(&mut { shown })]);
         }
-        let hertz = |bin: usize| bin as f64 / (length as f64 * period);
-        let [first, end] = self.band.map(|edge| libm::ceil(edge * length as f64 * period) as usize);
+        // Zero padding correlates neighbouring lines.
+        let tied = length as f64 / motion.corrected as f64;
+        Ok(SweepSpectra {
+            pairs,
+            line: 1.0 / (length as f64 * period),
+            tied,
+            band: self.band,
+            held: f64::from(self.spacing) * period,
+        })
+    }
+}
+
+/// Spectra of the corrections and the gauges of each pass.
+pub struct SweepSpectra {
+    pairs: Vec<[[Vec<Complex64>; 6]; 2]>,
+    /// Distance of two lines, Hz, and how many of them are as good as one.
+    line: f64,
+    tied: f64,
+    /// Lowest and highest frequency, Hz.
+    band: [f64; 2],
+    /// Time from knot to knot, s.
+    held: f64,
+}
+
+impl SweepSpectra {
+    /// T with its standard error, for learning; `names` are the digest of the spec and the machine.
+    #[must_use]
+    pub fn response(&self, names: [&str; 2]) -> Response {
+        Response::new(names, self.bins(WIDTH))
+    }
+
+    /// The same in bins as narrow as lightly damped modes of a structure.
+    #[must_use]
+    pub fn narrow(&self) -> Vec<Bin> {
+        self.bins(NARROW)
+    }
+
+    fn bins(&self, least: [f64; 2]) -> Vec<Bin> {
+        let hertz = |bin: usize| bin as f64 * self.line;
+        let [first, end] = self.band.map(|edge| libm::ceil(edge / self.line) as usize);
         let width = |low: usize| {
-            let [least, part] = [WIDTH[0], WIDTH[1] * hertz(low)].map(|width| libm::floor(width / hertz(1)));
+            let [least, part] = [least[0], least[1] * hertz(low)].map(|width| libm::floor(width / hertz(1)));
             let width = if part > least { part } else { least };
             if width > 1.0 { width as usize } else { 1 }
         };
-        // Zero padding correlates neighbouring bins.
-        let tied = length as f64 / motion.corrected as f64;
-        let held = f64::from(self.spacing) * period;
         let mut bins = Vec::new();
         let mut low = first;
         while low < end {
@@ -154,21 +192,22 @@ impl Excitation {
             let group = low..if above < end { above } else { end };
             low = group.end;
             let middle = 0.5 * (hertz(group.start) + hertz(group.end - 1));
-            let (response, error) = regression(&pairs, group, tied);
-            let scale = 1.0 / kept(middle * held);
+            let (response, error) = regression(&self.pairs, group, self.tied);
+            let scale = 1.0 / kept(middle * self.held);
             bins.push(Bin {
                 hertz: rounded(middle),
                 response: response.map(|row| row.map(|value| value.map(|part| rounded(scale * part)))),
                 error: error.map(|row| row.map(|value| rounded(scale * value))),
             });
         }
-        Ok(Response::new(names, bins))
+        bins
     }
 }
 
-/// Amplitude of the sweep at a frequency (Hz) relative to that at its end.
+/// Relative amplitude of the sweep at a frequency, Hz.
 fn larger(hertz: f64) -> f64 {
-    1.0 + SLOW[0] / if hertz > SLOW[1] { hertz } else { SLOW[1] }
+    let fast = if hertz > FAST { FAST / hertz } else { 1.0 };
+    fast * (1.0 + SLOW[0] / if hertz > SLOW[1] { hertz } else { SLOW[1] })
 }
 
 /// A sine whose frequency rises exponentially from the lower end of a band (Hz) to the upper in the given ticks; 0 afterwards.
@@ -188,7 +227,7 @@ fn sweep(ticks: usize, all: usize, period: f64, [low, high]: [f64; 2]) -> Vec<f6
         .collect()
 }
 
-/// T and its standard errors for a group of bins, over passes of (input, output) spectra; one of `tied` bins is independent.
+/// T and its standard errors for a group of lines, over passes of (input, output) spectra; one of `tied` lines is independent.
 fn regression(
     pairs: &[[[Vec<Complex64>; 6]; 2]],
     group: std::ops::Range<usize>,

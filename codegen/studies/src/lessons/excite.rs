@@ -9,7 +9,7 @@ use serde::Serialize;
 
 use super::{MachineSource, Options, SessionResult, learnable_of, machine_name, motion_of};
 use crate::factors::Factors;
-use crate::learning::{Convergence, Excitation, ModeMeasurement, PASSES, takes_correction};
+use crate::learning::{Convergence, Excitation, ModeMeasurement, PASSES, Structure, takes_correction};
 use specgen_compiler::compile::Compilation;
 use specgen_language::interrupt;
 use specgen_language::outcome::{Failure, Outcome};
@@ -36,23 +36,28 @@ pub(super) fn run(
         compiled,
         ui,
         |repeating, ui| {
-            let measured = excitation.measure(repeating, &learnable, &motion, names, |number| {
+            let measured = excitation.measure(repeating, &learnable, &motion, |number| {
                 ui.rate(&format!("learn: sweep {} of {PASSES}", number + 1));
                 if stop.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
             });
             ui.rate_done();
             measured
         },
-        |response, ui| {
+        |spectra, ui| {
+            let response = spectra.response(names);
             write_file(path, response.to_json().as_bytes())?;
             let modes = learnable.mode_measurements(&response);
             ui.progress(&format!("wrote the response at {} frequencies to {}", response.bins.len(), path.display()));
+            ui.rate("learn: fit of structural modes");
+            let structure = learnable.structure(compiled, &spectra.narrow());
+            ui.rate_done();
             Ok(MeasuredResponse {
                 name: compiled.ir.name.clone(),
                 machine: machine.clone(),
                 band: excitation.band,
                 amplitude_nm: excitation.amplitude * 1e9,
                 modes,
+                structure,
                 convergence: learnable_of(compiled)?.with(response).convergence(&factors, options.bandwidth),
                 file: path.display().to_string(),
             })
@@ -67,6 +72,43 @@ pub(super) fn run(
     }
 }
 
+/// What the response, measured up to `high` (Hz), shows of the structure, with lines for the spec.
+fn shown(structure: Option<&Structure>, high: f64) -> String {
+    let Some(Structure { modes, unresolved, band, .. }) = structure else {
+        return "  structural modes: the sweep covers too little; choose a higher --bandwidth\n".to_owned();
+    };
+    let mut text = match (modes.len(), unresolved) {
+        (0, None) => "  structural modes: none found\n".to_owned(),
+        (count, None) => format!("  structural modes: {count} found\n"),
+        (count, Some(hertz)) => format!(
+            "  structural modes: {count} found; a resonance near {hertz:.0} Hz is too uncertain, measure along a longer motion\n"
+        ),
+    };
+    let f0 = match band {
+        Some([low, known]) => {
+            text.push_str(&format!(
+                "  the response shows no other mode from {low:.0} to {known:.0} Hz; measured up to {high:.0} Hz (--bandwidth).\n"
+            ));
+            Some(10.0 * libm::floor(known / 10.0))
+        }
+        None => {
+            text.push_str("  the response is too uncertain to exclude other modes; measure along a longer motion\n");
+            None
+        }
+    };
+    if f0.is_some() || !modes.is_empty() {
+        text.push_str("  for the spec:\n\n");
+    }
+    if let Some(f0) = f0 {
+        text.push_str(&format!("[robust.structure]\nf0 = \"{f0:.0} Hz\"\n\n"));
+    }
+    for mode in modes {
+        text.push_str(&mode.lines());
+        text.push('\n');
+    }
+    text
+}
+
 /// Report of a measurement.
 #[derive(Serialize)]
 struct MeasuredResponse {
@@ -77,6 +119,8 @@ struct MeasuredResponse {
     /// Amplitude at the joints, along the axis with the largest motion, nm.
     amplitude_nm: f64,
     modes: [ModeMeasurement; 6],
+    /// Structural modes beyond those of the model, if the record suffices for a fit.
+    structure: Option<Structure>,
     /// Convergence of learning with this response, if any.
     convergence: Option<Convergence>,
     file: String,
@@ -84,7 +128,7 @@ struct MeasuredResponse {
 
 impl Outcome for MeasuredResponse {
     fn text(&self) -> String {
-        let Self { name, machine, band: [low, high], amplitude_nm, modes, convergence, file } = self;
+        let Self { name, machine, band: [low, high], amplitude_nm, modes, structure, convergence, file } = self;
         let mut text = format!(
             "{name}: response of the running loop from {low:.1} to {high:.0} Hz, {PASSES} sweeps of\n  {amplitude_nm:.0} nm ({machine})\n"
         );
@@ -95,6 +139,7 @@ impl Outcome for MeasuredResponse {
             let cells = [format!("{frequency:.1}"), at(largest), at(modelled), format!("{:.1} %", 100.0 * error)];
             row(&mut text, &columns, &[&cells[0], &cells[1], &cells[2], &cells[3]]);
         }
+        text.push_str(&shown(structure.as_ref(), *high));
         // Writing to a String cannot fail.
         let _ = match convergence {
             Some(Convergence { band: [low, high], radius, at, .. }) => writeln!(
