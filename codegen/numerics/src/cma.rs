@@ -271,6 +271,11 @@ mod tests {
     }
 
     #[test]
+    fn rejected_candidates_rank_last_and_ties_keep_their_order() {
+        assert_eq!(ranked(&[Some(2.0), None, Some(1.0), Some(2.0), None]), [2, 0, 3, 1, 4]);
+    }
+
+    #[test]
     fn a_minimum_on_the_boundary_of_the_rejected_region_is_found() {
         let f = |x: &[f64]| (x[0] + x[1] > 0.6).then(|| x[0] * x[0] + 2.0 * x[1] * x[1]);
         // By Lagrange multipliers: x0 = 0.4, x1 = 0.2.

@@ -95,17 +95,18 @@ pub fn modes(design: &Design) -> Grid {
 pub fn damping(design: &Design) -> Option<Grid> {
     let damping = design.damping.as_ref()?;
     let at = SLOW.map(|part| format!("|S| at {} Hz", digits(design.modes[0].frequency / TAU / part)));
-    let mut head = vec!["mode", "Hz", "compliance peak ×", "largest |S|", "worst |S|"];
+    let mut head = vec!["mode", "Hz", "compliance peak ×", "largest |S|", "worst |S|", "tracking error ×"];
     head.extend(at.iter().map(String::as_str));
     let mut table = Grid::new("Active damping in P/F (without it in parentheses)", &head);
     for (number, (mode, found)) in design.modes.iter().zip(&damping.modes).enumerate() {
         let mut row = vec![format!("{}", number + 1), digits(mode.frequency / TAU)];
         match found {
-            Some(DampedMode { compliance, sensitivity, slow, without }) => {
+            Some(DampedMode { compliance, sensitivity, slow, without, tracking }) => {
                 row.extend([*compliance, sensitivity[0], sensitivity[1]].map(|value| format!("{value:.2}")));
+                row.push(format!("{tracking:.2}"));
                 row.extend(slow.iter().zip(without).map(|(with, without)| format!("{with:.3} ({without:.3})")));
             }
-            None => row.extend(["too fast for the period", "", "", "", "", ""].map(str::to_owned)),
+            None => row.extend(["too fast for the period", "", "", "", "", "", ""].map(str::to_owned)),
         }
         table.push(row);
     }

@@ -2,6 +2,7 @@
 //! new folder needs an entry in `PARTS` and a line in the script.
 
 use std::collections::BTreeSet;
+use std::sync::LazyLock;
 
 use specgen_language::model;
 
@@ -24,15 +25,42 @@ impl Part {
     /// Path below the workspace, text.
     #[must_use]
     pub fn files(&self) -> &'static [(&'static str, &'static str)] {
-        files::of(self.folder)
+        files(self.folder)
     }
 }
 
-/// The files of the folders.
-mod files {
-    include!(concat!(env!("OUT_DIR"), "/files.rs"));
+include!(concat!(env!("OUT_DIR"), "/files.rs"));
+
+/// A folder, and of each of its files: path below the workspace, text.
+type Texts = (&'static str, Vec<(&'static str, &'static str)>);
+
+/// [`FOLDERS`] with their texts, unpacked when a command first asks for one.
+static TEXTS: LazyLock<Vec<Texts>> = LazyLock::new(|| {
+    let packed = include_bytes!(concat!(env!("OUT_DIR"), "/files.deflate"));
+    let all = miniz_oxide::inflate::decompress_to_vec(packed).unwrap_or_default();
+    let mut rest: &'static str = String::from_utf8(all).unwrap_or_default().leak();
+    let mut text = |bytes| {
+        let (text, behind) = rest.split_at_checked(bytes).unwrap_or_default();
+        rest = behind;
+        text
+    };
+    FOLDERS
+        .iter()
+        .map(|(folder, files)| (*folder, files.iter().map(|(path, bytes)| (*path, text(*bytes))).collect()))
+        .collect()
+});
+
+/// Of each file of a folder of `firmware`, of `host-sim` or of `unit`: path below the workspace, text.
+#[must_use]
+pub fn files(folder: &str) -> &'static [(&'static str, &'static str)] {
+    TEXTS.iter().find(|(name, _)| *name == folder).map_or(&[], |(_, files)| files)
 }
-pub use files::{HOST_SIM, UNIT};
+
+/// Text of a file of the repository that studies write: a record, `Cargo.lock`.
+#[must_use]
+pub fn text(path: &str) -> &'static str {
+    files("repository").iter().find(|(name, _)| *name == path).map_or("", |(_, text)| text)
+}
 
 /// All folders except boards.
 const PARTS: [Part; 11] = [

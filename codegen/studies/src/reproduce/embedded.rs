@@ -4,6 +4,7 @@ use std::fs;
 use std::io;
 use std::path::Path;
 
+use specgen_compiler::workspace::parts::text as text_of;
 use specgen_language::spec::SpecSource;
 
 /// Six legs with their own gauges, section 3 of the paper.
@@ -11,17 +12,16 @@ pub const LEGS: &str = include_str!("../../../../specs/legs.toml");
 /// The platform, section 4.
 pub const PLATFORM: &str = include_str!("../../../../specs/reference.toml");
 /// The record that both use.
-const RECORD: (&str, &str) =
-    ("records/reference-forc.csv", include_str!("../../../../specs/records/reference-forc.csv"));
+const RECORD: &str = "records/reference-forc.csv";
 
 /// `text` as a spec in `folder`; writes its record there.
 ///
 /// # Errors
 /// If the record cannot be written.
 pub fn source(name: &str, text: &str, folder: &Path) -> io::Result<SpecSource> {
-    let record = folder.join(RECORD.0);
+    let record = folder.join(RECORD);
     let made = record.parent().map_or(Ok(()), fs::create_dir_all);
-    made.and_then(|()| fs::write(&record, RECORD.1))
+    made.and_then(|()| fs::write(&record, text_of(&format!("specs/{RECORD}"))))
         .map_err(|error| io::Error::new(error.kind(), format!("could not write `{}`: {error}", record.display())))?;
     Ok(SpecSource { display_name: format!("specs/{name}.toml"), text: text.to_owned(), dir: folder.to_owned() })
 }

@@ -266,13 +266,3 @@ pub fn evaluate(
     });
     outcomes
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn rejected_candidates_rank_last_and_ties_keep_their_order() {
-        assert_eq!(ranked(&[Some(2.0), None, Some(1.0), Some(2.0), None]), [2, 0, 3, 1, 4]);
-    }
-}

@@ -7,7 +7,7 @@ use host_sim::plant::LegParameters;
 use host_sim::word::{Scalar, WordKind};
 use plant_unit::{Description, Kind, SETTINGS, Settings};
 use specgen_compiler::compile::Compilation;
-use specgen_compiler::workspace::parts::{HOST_SIM, UNIT};
+use specgen_compiler::workspace::parts::{files, text};
 use specgen_language::interrupt::Scratch;
 use specgen_toolchain::host::build_unit;
 use toml_edit::{Array, DocumentMut};
@@ -19,7 +19,7 @@ use specgen_language::ui::Ui;
 
 const MODEL: &str = include_str!("plant_model.h");
 const MANIFEST: &str = include_str!("../../../../../Cargo.toml");
-const LOCK: &str = include_str!("../../../../../Cargo.lock");
+const LOCK: &str = "Cargo.lock";
 /// The crate to build, and its folder.
 const PACKAGE: (&str, &str) = ("plant-unit", "unit");
 /// Members of the workspace of sources.
@@ -83,7 +83,8 @@ fn unit<'a>(compiled: &'a Compilation, description: &Description) -> Unit<'a> {
 
 /// A workspace of the plant's crates, with specgen's own dependency versions and flags.
 fn rust(compiled: &Compilation) -> Result<BTreeMap<String, String>, Failure> {
-    let ours = HOST_SIM.iter().chain(UNIT).map(|(name, text)| ((*name).to_owned(), (*text).to_owned()));
+    let ours =
+        files("host-sim").iter().chain(files("unit")).map(|(name, text)| ((*name).to_owned(), (*text).to_owned()));
     let mut files: BTreeMap<String, String> = ours.collect();
     if let Some(manifest) = files.get_mut("unit/Cargo.toml") {
         // The runtime is a sibling of the simulator here, not its parent.
@@ -96,7 +97,7 @@ fn rust(compiled: &Compilation) -> Result<BTreeMap<String, String>, Failure> {
         workspace.insert("members", toml_edit::value(MEMBERS.into_iter().collect::<Array>()));
         ["exclude", "default-members"].iter().for_each(|key| drop(workspace.remove(key)));
     }
-    let lock = pruned(LOCK, PACKAGE.0);
+    let lock = pruned(text(LOCK), PACKAGE.0);
     if let Some(profiles) = manifest["profile"].as_table_mut() {
         profiles.retain(|name, _| name == "release");
         if let Some(packages) = profiles["release"]["package"].as_table_mut() {
@@ -185,7 +186,7 @@ mod tests {
                       [[package]]\nname = \"b\"\nversion = \"2.0.0\"\n";
         assert_eq!(pruned(lock, "a"), wanted);
         assert_eq!(pruned(lock, "c"), lock);
-        let ours = pruned(LOCK, PACKAGE.0);
+        let ours = pruned(text(LOCK), PACKAGE.0);
         assert!(ours.contains("\nname = \"host-sim\"\n") && !ours.contains("\nname = \"clap\"\n"), "{ours}");
     }
 
