@@ -72,7 +72,7 @@ fn what_a_board_recorded_is_downloaded_and_replays_bit_for_bit() {
     assert!(!status.running && status.triggered && status.ticks > 800, "{status:?}");
     assert!(status.ticks >= status.capacity, "{status:?}: the ring is full");
     assert_eq!(line.phase(), Phase::Running);
-    assert!(!line.with(|rig| rig.exchange.waves()), "the wave came to its end");
+    assert!(!line.with(|rig| rig.exchange.source.waves()), "the wave came to its end");
 
     let clean = download(&mut client);
     let found = again(&clean, &mut machine);
@@ -106,7 +106,7 @@ fn what_a_board_recorded_is_downloaded_and_replays_bit_for_bit() {
     line.parts(|parts| parts.fails = true);
     wait(&line, &mut client, "fault", |line| line.phase() == Phase::Faulted);
     line.tick(100);
-    assert!(!line.with(|rig| rig.exchange.waves()));
+    assert!(!line.with(|rig| rig.exchange.source.waves()));
     let status = record(&mut client, RecorderAction::Look);
     assert!(!status.running && status.triggered, "{status:?}");
     let found = again(&download(&mut client), &mut machine);

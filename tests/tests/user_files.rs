@@ -28,7 +28,7 @@ const DEVICE: &str = "a device or shared memory, opened without waiting";
 const LISTED: &[(&str, usize, &str)] = &[
     ("codegen/language/src/output.rs", 1, OWN),
     ("codegen/operate/src/panel/http.rs", 1, SYSTEM),
-    ("codegen/compiler/src/workspace/found.rs", 2, OUTPUT),
+    ("codegen/compiler/src/workspace/contents.rs", 2, OUTPUT),
     ("codegen/compiler/src/workspace/hold.rs", 1, OUTPUT),
     ("codegen/compiler/src/workspace/output.rs", 5, OUTPUT),
     ("codegen/compiler/src/workspace/output/replace.rs", 3, OUTPUT),

@@ -4,7 +4,6 @@ mod binaries;
 mod builds;
 mod changelog;
 mod fuzz;
-mod judged;
 mod mutants;
 mod packages;
 mod progress;
@@ -12,6 +11,7 @@ mod release;
 mod results;
 mod skips;
 mod steps;
+mod suite;
 mod wheel;
 
 use std::process::ExitCode;

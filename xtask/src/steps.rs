@@ -5,10 +5,10 @@ use std::process::{Command, ExitCode};
 use std::time::Instant;
 
 use crate::binaries::{self, Binary, Mode, TestResults};
-use crate::judged::Suite;
 use crate::mutants::Sample;
 use crate::run::{Outcome, Report, SKIPPED, cargo, expect_success};
 use crate::setup::{self, TRIPLE};
+use crate::suite::Suite;
 use crate::{fuzz, mutants, packages, results, wheel};
 
 /// A workspace for another machine.

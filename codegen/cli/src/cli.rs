@@ -8,6 +8,7 @@ mod build;
 mod cache;
 mod check;
 mod completions;
+mod design;
 mod doctor;
 mod dynamics;
 mod examples;
@@ -20,11 +21,11 @@ mod identify;
 mod learn;
 mod line;
 mod lsp;
-mod named;
 mod new;
 mod number;
 mod operate;
 mod panel;
+mod path_roles;
 mod pil;
 mod plant;
 mod plot;
@@ -46,7 +47,7 @@ use clap::{ArgMatches, Args, CommandFactory, FromArgMatches, Parser, Subcommand}
 use serde::Serialize;
 use serde_json::Value;
 
-pub use named::{Role, role};
+pub use path_roles::{Role, role};
 use specgen_compiler::ir::Ir;
 use specgen_compiler::spec_file;
 use specgen_language::outcome::{Failure, Outcome};
@@ -111,6 +112,8 @@ enum Command {
     Sim(sim::Arguments),
     /// Tune gains and weights on the simulated loop.
     Tune(tune::Arguments),
+    /// Design active damping for every structural mode that the spec permits, and write it into the spec.
+    Design(design::Arguments),
     /// Learn a repeated motion, simulated or on a machine: measure passes and compute the correction that cancels their error.
     Learn(learn::Arguments),
     /// Test the closed loop on corners and random draws of the declared uncertainties, for instance as a build gate.
@@ -147,7 +150,7 @@ enum Command {
     #[command(after_help = examples::DUMP_IR)]
     DumpIr {
         /// The spec file.
-        spec: named::InputFile,
+        spec: path_roles::InputFile,
     },
     /// Show the size of the build cache, or clear it.
     Cache(cache::Arguments),
@@ -158,7 +161,7 @@ enum Command {
 /// The command line as clap sees it: commands, options and their help.
 #[must_use]
 pub fn command() -> clap::Command {
-    named::with_hints(Cli::command())
+    path_roles::with_hints(Cli::command())
 }
 
 /// Runs the command that the process was started with.
@@ -233,7 +236,7 @@ fn parsed(arguments: impl IntoIterator<Item = OsString>) -> Result<(Cli, ArgMatc
 /// Runs the requested command.
 fn perform(cli: &Cli, matches: &ArgMatches, ui: &mut Ui) -> Result<(), Failure> {
     files::forget_inputs();
-    named::check(matches)?;
+    path_roles::check(matches)?;
     match &cli.command {
         None => match misspelt(cli.build.spec.as_deref()) {
             Some(failure) => Err(failure),
@@ -247,6 +250,7 @@ fn perform(cli: &Cli, matches: &ArgMatches, ui: &mut Ui) -> Result<(), Failure> 
         Some(Command::Flash(arguments)) => firmware::run_flash(arguments, ui),
         Some(Command::Sim(arguments)) => sim::run(arguments, ui),
         Some(Command::Tune(arguments)) => tune::run(arguments, ui),
+        Some(Command::Design(arguments)) => design::run(arguments, ui),
         Some(Command::Learn(arguments)) => learn::run(arguments, ui),
         Some(Command::Robust(arguments)) => robust::run(arguments, ui),
         Some(Command::Report(arguments)) => report::run(arguments, ui),

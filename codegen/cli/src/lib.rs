@@ -13,7 +13,7 @@ pub use specgen_compiler::{
 };
 pub use specgen_identify::{self as identify, everett, waveform};
 pub use specgen_language::{diagnostic, files, interrupt, lock, model, outcome, shell, spec, ui};
-pub use specgen_operate::{self as operate, doctor, pil, served};
+pub use specgen_operate::{self as operate, doctor, pil, plant_server};
 pub use specgen_report::{self as report, plot};
 pub use specgen_run_time as run_time;
 pub use specgen_studies::{lead, learning, machine, paper, reproduce, robust, tuning, verify};

@@ -2,8 +2,8 @@
 //! sources that specgen was built with, each behind a line with the licence. [`write()`] writes them into a folder, completely or
 //! not at all.
 
+mod contents;
 mod error;
-mod found;
 mod hold;
 mod output;
 pub mod parts;

@@ -364,7 +364,7 @@ fn begin(
     let period = compiled.model.timing.period;
     let spacing = convergence.spacing(period);
     if options.prepare {
-        return Ok((knots(&Update::prepared(learnable, motion, convergence.band[1], &[]), spacing), spacing));
+        return Ok((knots(&Update::prepared(learnable, motion, convergence.band[1]), spacing), spacing));
     }
     let Some(path) = &options.from else { return Ok((Vec::new(), spacing)) };
     let table = Table::of_file(path).map_err(|error| Failure::Gate(format!("{}: {error}", path.display())))?;

@@ -21,6 +21,7 @@ pub mod begin;
 pub mod build;
 pub mod check;
 pub mod controllers;
+pub mod design;
 pub mod details;
 pub mod dynamics;
 pub mod export;

@@ -19,7 +19,7 @@ use serde::{Deserialize, Serialize};
 
 use specgen_compiler::compile::Compilation;
 use specgen_language::files;
-use specgen_language::model::{Model, TaskSpace};
+use specgen_language::model::{self as language, Model, StructuralKind, TaskSpace};
 use specgen_language::outcome::Failure;
 
 /// Gain of the reference leg's controller, 5 × 0.1262 µm/V, to which its measured gain is related, m/V.
@@ -195,9 +195,19 @@ pub fn leg(model: &Model, leg: &LegParameters) -> LegParameters {
     }
 }
 
-/// What the spec says about the structure beyond a rigid platform on six legs: its known modes belong here.
-fn known_structure(_model: &Model) -> Imperfections {
-    Imperfections::default()
+/// What the spec says about the structure beyond a rigid platform on six legs: its known modes.
+fn known_structure(model: &Model) -> Imperfections {
+    let mode = |mode: &language::StructuralMode| StructuralMode {
+        place: match mode.kind {
+            StructuralKind::Leg => ModePlace::Leg(mode.place),
+            StructuralKind::Gauge => ModePlace::Gauge(mode.place),
+            StructuralKind::Frame => ModePlace::Frame,
+        },
+        frequency_hz: mode.frequency,
+        damping_ratio: mode.damping_ratio,
+        participation: (mode.kind != StructuralKind::Leg).then_some(mode.participation),
+    };
+    Imperfections { modes: model.structural_modes.iter().map(mode).collect(), ..Imperfections::default() }
 }
 
 /// Ranges of a random structure with one mode that the controller does not know.
@@ -214,20 +224,21 @@ pub struct StructureRange {
 }
 
 impl StructureRange {
-    /// For a machine without a declared range: from 2.5 times its lowest mode to 5 kHz, damping ratio 0.01 to 0.03, in the
-    /// legs, the gauge mounts (participation 0.5) or the frame (−0.1).
+    /// That of a spec, up to 5 kHz and three times the least damping ratio; `machine` gives the default of f0.
     #[must_use]
-    pub fn of(machine: &Specimen) -> Self {
+    pub fn of(model: &Model, machine: &Specimen) -> Self {
+        let declared = &model.structure;
         let lowest = machine.structure().modes().0[0] / core::f64::consts::TAU;
+        let kind = |kind: &StructuralKind| match kind {
+            StructuralKind::Leg => (ModePlace::Leg(None), None),
+            StructuralKind::Gauge => (ModePlace::Gauge(None), Some(declared.gauge_participation)),
+            StructuralKind::Frame => (ModePlace::Frame, Some(declared.frame_participation)),
+        };
         Self {
-            from_hz: 2.5 * lowest,
+            from_hz: declared.from.unwrap_or(2.5 * lowest),
             to_hz: 5e3,
-            damping_ratio: [0.01, 0.03],
-            kinds: vec![
-                (ModePlace::Leg(None), None),
-                (ModePlace::Gauge(None), Some(0.5)),
-                (ModePlace::Frame, Some(-0.1)),
-            ],
+            damping_ratio: [declared.damping_ratio, 3.0 * declared.damping_ratio],
+            kinds: declared.kinds.iter().map(kind).collect(),
         }
     }
 }

@@ -133,7 +133,7 @@ impl<'m, G: Gauges, A: Amplifiers, L: Lines> Board<'m, G, A, L> {
             self.stand_by(exchange, noticed);
             return false;
         }
-        let Exchange { orders, config, report, silence, recorder, orphaned, pending, .. } = exchange;
+        let Exchange { orders, config, report, silence, recorder, orphaned, source, .. } = exchange;
         let acknowledged = orders.request == Request::Acknowledge && self.request != Request::Acknowledge;
         self.request = orders.request;
         let restart = acknowledged && !report.amplifier_on;
@@ -177,7 +177,7 @@ impl<'m, G: Gauges, A: Amplifiers, L: Lines> Board<'m, G, A, L> {
 
         // Sampled with the gauges; the supervisor does not use it.
         let rose = triggers::INPUT
-            && pending.sense(self.lines.input().map_err(|fault| {
+            && source.pending.sense(self.lines.input().map_err(|fault| {
                 report.converter(fault);
                 self.carried |= CONVERTER;
             }));
@@ -215,7 +215,8 @@ impl<'m, G: Gauges, A: Amplifiers, L: Lines> Board<'m, G, A, L> {
             record_after(self.machine, input, &output, recorder);
         }
         if passes::POSSIBLE {
-            exchange.keep_pass(self.machine, output.tick.status);
+            let Exchange { source, orders, .. } = exchange;
+            source.keep_pass(&self.machine.state, output.tick.status, &mut orders.command);
         }
         if let Some(samples) = &mut exchange.samples {
             // Missed ticks count, too.

@@ -7,14 +7,13 @@ use controller::waves::{self, Wave};
 use controller::{COMMAND_WORDS, Config, Real, passes, triggers};
 use specgen_link::{PassStatus, Refusal, Silence};
 use specgen_runtime::pass::{Course, Player};
-use specgen_runtime::pending::EdgeWait;
 use specgen_runtime::playback::Knot;
 use specgen_runtime::setpoint::BUSY;
-use specgen_runtime::wave::Stage;
 
 use crate::recording::{MachineSnapshot, recorder};
 use crate::report::{Probes, Report};
 use crate::samples::{self, SampleMemory, Samples};
+use crate::source::{EdgeCommand, Source};
 #[cfg(feature = "lockstep")]
 use crate::words::PERIOD_NANOSECONDS;
 
@@ -30,15 +29,6 @@ pub struct TickCommand {
     pub command: [u64; COMMAND_WORDS],
     /// Request to the supervisor. It applies to every tick while it is here.
     pub request: Request,
-}
-
-/// A command that waits for the edge of the input line.
-#[derive(Debug, Clone, Copy)]
-pub(crate) enum EdgeCommand {
-    /// This command.
-    Command([u64; COMMAND_WORDS]),
-    /// The wave in [`Exchange::wave`], which has not started.
-    Wave,
 }
 
 /// Commands in one direction, reports in the other. Its lock holds off the tick: copy and release.
@@ -64,12 +54,8 @@ pub struct Exchange {
     pub recorder: Option<Recorder<'static>>,
     /// Source of the recorder's pending data, see [`catch_up`](crate::catch_up); none while the background uses it.
     pub(crate) kept: Option<&'static mut MachineSnapshot>,
-    /// Generates the set-points while it is under way.
-    pub wave: Option<Wave>,
-    /// The input line, and the command that waits for it.
-    pub(crate) pending: EdgeWait<EdgeCommand>,
-    /// Corrects the motion while a pass is under way, if it was given memory.
-    pub player: Option<Player<'static, Real>>,
+    /// Wave, pass and waiting command.
+    pub source: Source<Player<'static, Real>>,
     /// Status of the player while the background uses it for learning.
     pub(crate) away: Option<PassStatus>,
     /// Samples for a subscribed host, if they were given memory.
@@ -104,9 +90,7 @@ impl Exchange {
             silence: Silence::new(HOST_TICKS),
             recorder: None,
             kept: None,
-            wave: None,
-            pending: EdgeWait::new(),
-            player: None,
+            source: Source::at_reset(),
             away: None,
             samples: None,
             lockstep: None,
@@ -125,7 +109,7 @@ impl Exchange {
     /// Provides memory for passes, if the controller takes a correction.
     pub fn play(&mut self, memory: &'static mut [Knot]) {
         if passes::POSSIBLE {
-            self.player = Some(Player::new(memory));
+            self.source.player = Some(Player::new(memory));
         }
     }
 
@@ -151,18 +135,6 @@ impl Exchange {
         if let Some(silence) = &mut self.lockstep {
             silence.heard();
         }
-    }
-
-    /// Whether a wave is under way.
-    #[must_use]
-    pub fn waves(&self) -> bool {
-        self.wave.as_ref().is_some_and(|wave| wave.stage() != Stage::Idle)
-    }
-
-    /// Whether a wave or a pass is under way, which commands in place of the host.
-    #[must_use]
-    pub fn is_engaged(&self) -> bool {
-        self.waves() || self.player.as_ref().is_some_and(Player::is_running)
     }
 
     /// The newest settings, in force or not.
@@ -193,51 +165,19 @@ impl Exchange {
                 }
             }
         }
+        let Self { orders: TickCommand { command, .. }, report, .. } = self;
+        let phase = report.phase;
         if triggers::INPUT {
-            self.begin_awaited();
+            self.source.begin_awaited(report.tick - 1, phase, report.status, &self.config, command);
         }
-        self.advance_wave();
+        self.source.advance_wave(phase, command);
         if passes::POSSIBLE {
-            self.advance_pass();
+            self.source.advance_pass(phase, command);
         }
-        let runs = self.report.phase == Phase::Running;
+        let runs = phase == Phase::Running;
         if core::mem::replace(&mut self.ran, runs) && !runs {
             // An old command must not take effect when the machine runs again.
-            waves::rest(&[0.0; 6], &mut self.orders.command);
-        }
-    }
-
-    /// Starts the waiting command in the tick after the edge. If the machine does not run, nothing waits.
-    #[inline(never)]
-    fn begin_awaited(&mut self) {
-        if self.report.phase != Phase::Running {
-            self.cancel_awaited();
-        }
-        let Some(awaited) = self.pending.due() else { return };
-        let (free, status) = (!self.is_engaged() && self.report.status & BUSY == 0, self.report.status);
-        let begun = match (awaited, &mut self.wave) {
-            (EdgeCommand::Command(command), _) if free => {
-                self.orders.command = command;
-                true
-            }
-            (EdgeCommand::Wave, Some(wave)) if free => {
-                let limits = waves::limits(&self.config);
-                let may = waves::may_begin(status, &self.orders.command, wave.center(), &limits).is_ok();
-                if may {
-                    wave.start();
-                }
-                may
-            }
-            _ => false,
-        };
-        self.pending.settle(self.report.tick - 1, begun);
-    }
-
-    /// Removes the waiting command.
-    pub(crate) fn cancel_awaited(&mut self) {
-        self.pending.cancel();
-        if !self.waves() {
-            self.wave = None;
+            waves::rest(&[0.0; 6], command);
         }
     }
 
@@ -250,27 +190,12 @@ impl Exchange {
             return Err(Refusal::Unsupported);
         }
         let rests = self.report.phase == Phase::Running && self.report.status & BUSY == 0;
-        if !rests || self.in_lockstep() || self.is_engaged() {
+        if !rests || self.in_lockstep() || self.source.is_engaged() {
             return Err(Refusal::State);
         }
-        self.wave = wave;
-        self.pending.wait(awaited);
+        self.source.wave = wave;
+        self.source.pending.wait(awaited);
         Ok(())
-    }
-
-    /// Writes the set-point of a wave into the command, and the hold when the wave has ended. Only a running machine
-    /// follows one. Not inlined, so that its stack frame is released before the law needs the stack.
-    #[inline(never)]
-    fn advance_wave(&mut self) {
-        let Some(wave) = self.wave.as_mut().filter(|wave| wave.stage() != Stage::Idle) else { return };
-        if self.report.phase != Phase::Running {
-            self.wave = None;
-            return;
-        }
-        match wave.advance() {
-            Some(motion) => waves::write(&motion, wave.sequence(), &mut self.orders.command),
-            None => self.wave = None,
-        }
     }
 
     /// Begins a pass with the next tick.
@@ -278,51 +203,22 @@ impl Exchange {
     /// # Errors
     /// If the machine does not run at rest, a wave or a pass is under way, or the pass is invalid or too long.
     pub(crate) fn begin_pass(&mut self, course: Course) -> Result<(), Refusal> {
-        let runs = self.report.phase == Phase::Running && !self.in_lockstep() && !self.is_engaged();
+        let runs = self.report.phase == Phase::Running && !self.in_lockstep() && !self.source.is_engaged();
         if !runs || self.away.is_some() || !passes::may_begin(self.report.status, &self.orders.command) {
             return Err(Refusal::State);
         }
-        let player = self.player.as_mut().ok_or(Refusal::Unsupported)?;
+        let player = self.source.player.as_mut().ok_or(Refusal::Unsupported)?;
         if !player.begin(course) {
             return Err(Refusal::Word { index: 0 });
         }
-        self.cancel_awaited();
-        self.advance_pass();
+        self.source.cancel_awaited();
+        self.source.advance_pass(Phase::Running, &mut self.orders.command);
         Ok(())
-    }
-
-    /// Writes the next correction of a pass into the command. Only a running machine has one.
-    #[inline(never)]
-    pub(crate) fn advance_pass(&mut self) {
-        if self.report.phase != Phase::Running {
-            self.abort_pass();
-        }
-        if let Some(given) = self.player.as_mut().and_then(Player::give) {
-            passes::write(&given, &mut self.orders.command);
-        }
-    }
-
-    /// Records a tick of a pass; after the last one the correction ends.
-    #[inline(never)]
-    pub(crate) fn keep_pass(&mut self, machine: &Machine, status: u32) {
-        if let (Some(player), Some([target, pose])) = (&mut self.player, passes::shown(&machine.state)) {
-            if player.is_running() {
-                player.keep(&target, &pose, status);
-                if !player.is_running() {
-                    passes::end(&mut self.orders.command);
-                }
-            }
-        }
     }
 
     /// Ends the pass under way, if there is one, and its correction.
     pub(crate) fn abort_pass(&mut self) {
-        if let Some(player) = &mut self.player {
-            if player.is_running() {
-                player.abort();
-                passes::end(&mut self.orders.command);
-            }
-        }
+        self.source.abort_pass(&mut self.orders.command);
     }
 
     /// Whether the host steps the machine. Always false in a program without the feature: the compiler then drops its
@@ -340,7 +236,7 @@ impl Exchange {
             silence.heard();
             self.lockstep = Some(silence);
             self.orders.request = Request::None;
-            self.wave = None;
+            self.source.wave = None;
             self.abort_pass();
         }
         at_rest

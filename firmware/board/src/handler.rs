@@ -17,11 +17,12 @@ use specgen_runtime::wave::Settings;
 
 use crate::catch_up::catch_up;
 use crate::download::{self, Download};
-use crate::exchange::{Access, EdgeCommand, Exchange};
+use crate::exchange::{Access, Exchange};
 use crate::gather::with_rows;
 use crate::recording;
 use crate::report::{Probes, Report, Stopwatch};
 use crate::requests::{Backend, Command, execute, pass_status, wave_refusal};
+use crate::source::EdgeCommand;
 #[cfg(feature = "lockstep")]
 use crate::stepper::{Costs, Stepper};
 use crate::words::PERIOD_NANOSECONDS;
@@ -125,7 +126,7 @@ impl RequestContext<'_, '_> {
 /// The player of passes, unless it is playing or learning.
 fn idle_player(exchange: &mut Exchange) -> Result<&mut Player<'static, Real>, Refusal> {
     let absent = if exchange.away.is_some() { Refusal::State } else { Refusal::Unsupported };
-    let player = exchange.player.as_mut().ok_or(absent)?;
+    let player = exchange.source.player.as_mut().ok_or(absent)?;
     if player.is_busy() { Err(Refusal::State) } else { Ok(player) }
 }
 
@@ -144,10 +145,7 @@ impl Backend for RequestContext<'_, '_> {
             // A new session has no request yet.
             exchange.orders.request = Wanted::None;
             exchange.leave_lockstep(machine);
-            exchange.cancel_awaited();
-            if let Some(wave) = &mut exchange.wave {
-                wave.stop();
-            }
+            exchange.source.stop_wave();
             exchange.abort_pass();
             let _ = exchange.watch(0);
         });
@@ -189,9 +187,9 @@ impl Backend for RequestContext<'_, '_> {
     fn command(&mut self, command: &Command) -> Result<(), Refusal> {
         self.change_command(|exchange| {
             // A command from before the run must not take effect later.
-            let free = !exchange.is_engaged() && exchange.report.phase == Phase::Running;
+            let free = !exchange.source.is_engaged() && exchange.report.phase == Phase::Running;
             if free {
-                exchange.cancel_awaited();
+                exchange.source.cancel_awaited();
                 exchange.orders.command = *command;
             }
             free
@@ -205,10 +203,9 @@ impl Backend for RequestContext<'_, '_> {
     fn edge(&mut self, drop: bool) -> Result<EdgeStatus, Refusal> {
         self.locked(Err(Refusal::Unsupported), |exchange, _| {
             if drop {
-                exchange.cancel_awaited();
+                exchange.source.cancel_awaited();
             }
-            let pending = &exchange.pending;
-            Ok(EdgeStatus { stage: pending.stage().word() as u8, edges: pending.edges(), tick: pending.tick() })
+            Ok(exchange.source.edge())
         })
     }
 
@@ -265,11 +262,11 @@ impl Backend for RequestContext<'_, '_> {
         self.change_command(|exchange| {
             let (status, command) = (exchange.report.status, &exchange.orders.command);
             let may = exchange.report.phase == Phase::Running
-                && !exchange.is_engaged()
+                && !exchange.source.is_engaged()
                 && waves::may_begin(status, command, &settings.center, &limits).is_ok();
             if may {
-                exchange.cancel_awaited();
-                exchange.wave = Some(wave);
+                exchange.source.cancel_awaited();
+                exchange.source.wave = Some(wave);
             }
             may
         })
@@ -277,10 +274,7 @@ impl Backend for RequestContext<'_, '_> {
 
     fn stop_wave(&mut self) -> Result<(), Refusal> {
         self.change_command(|exchange| {
-            exchange.cancel_awaited();
-            if let Some(wave) = &mut exchange.wave {
-                wave.stop();
-            }
+            exchange.source.stop_wave();
             true
         })
     }
@@ -306,10 +300,10 @@ impl Backend for RequestContext<'_, '_> {
                 }
                 PassAction::Learn { reach, fade } => {
                     let learns = |player: &mut Player<'_, Real>| player.learn(Plan { reach, fade }).then_some(());
-                    exchange.player.as_mut().and_then(learns).ok_or(Refusal::State)
+                    exchange.source.player.as_mut().and_then(learns).ok_or(Refusal::State)
                 }
             };
-            let status = exchange.away.or_else(|| exchange.player.as_ref().map(pass_status));
+            let status = exchange.away.or_else(|| exchange.source.player.as_ref().map(pass_status));
             status.map_or(Err(Refusal::Unsupported), |status| done.map(|()| status))
         })
     }

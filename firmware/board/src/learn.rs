@@ -16,14 +16,14 @@ pub fn learn(with: &mut Access<'_>) {
     }
     let mut player = None;
     with(&mut |exchange, _| {
-        player = exchange.player.take_if(|player| player.is_busy() && !player.is_running());
+        player = exchange.source.player.take_if(|player| player.is_busy() && !player.is_running());
         exchange.away = player.as_ref().map(pass_status);
     });
     let Some(mut learning) = player else { return };
     learning.work(STEPS);
     let mut player = Some(learning);
     with(&mut |exchange, _| {
-        exchange.player = player.take();
+        exchange.source.player = player.take();
         exchange.away = None;
     });
 }

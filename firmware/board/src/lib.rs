@@ -28,6 +28,7 @@ mod report;
 mod requests;
 mod samples;
 mod schedule;
+mod source;
 #[cfg(feature = "lockstep")]
 mod stepper;
 mod words;
@@ -45,4 +46,5 @@ pub use report::{Probes, Report, Stopwatch};
 pub use requests::{Backend, Command, execute, pass_status, wave_refusal};
 pub use samples::{SampleMemory, sample};
 pub use schedule::{DueTick, Schedule};
+pub use source::{EdgeCommand, Source};
 pub use words::{GAUGE_BITS, PERIOD_NANOSECONDS};

@@ -65,7 +65,7 @@ pub const GAUGES: Gauges<'static, Real> = Gauges {
 /// Words in V to readings in m, lowest power first; from `gauge.calibration`. Without one a word is a reading.
 pub const CALIBRATION: Option<Meaning> = None;
 
-/// What the gauges' words mean, with so many coefficients each.
+/// Conversion of the gauge words, with this number of coefficients each.
 pub type Meaning = Calibration<Real, 1>;
 
 /// Lowest and highest word of each gauge that is believed, m: readings within `sensor.range`, where the gauge means one reading by one word.

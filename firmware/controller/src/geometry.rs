@@ -68,6 +68,6 @@ pub const INVERSE_JACOBIAN: [[Real; LEGS]; 6] = [
 /// Largest |x|, |y|, |z| (m) and |θx|, |θy|, |θz| (rad) accepted; from `workspace`.
 pub(crate) const POSE_BOUND: [Real; 6] = [5e-5, 5e-5, 5.2e-5, 0.0004, 0.00035, 0.0005];
 
-/// Corrections of the forward kinematics: what they leave over the declared workspace is below 1e-13 m and rad, or
+/// Corrections of the forward kinematics. Over the declared workspace, their error is below 1e-13 m and rad, or
 /// the last bit.
 pub(crate) const CORRECTIONS: usize = 2;

@@ -8,7 +8,7 @@
 use specgen_runtime::setpoint::*;
 use crate::Real;
 
-/// What the generator of set-points needs to know; from `control.setpoint`, `control.frames`, `workspace`, `timing.period`
+/// Parameters of the set-point generator; from `control.setpoint`, `control.frames`, `workspace`, `timing.period`
 /// and `trajectory`.
 pub const SETPOINTS: Setpoints<Real, UserFrames> = Setpoints {
     period: 0.0001,

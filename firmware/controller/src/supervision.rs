@@ -10,7 +10,7 @@ use crate::identity::Constants;
 use crate::hysteresis::Memory;
 use crate::{Real, limits};
 
-/// Bounds and times, these in ticks, or in samples of six ticks.
+/// Bounds and times. Times are in ticks, or in samples of six ticks.
 pub const SUPERVISION: Supervision<Real> = Supervision {
     arm_ticks: 1000,
     rest: 0,

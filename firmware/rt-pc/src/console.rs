@@ -6,7 +6,7 @@ use std::collections::VecDeque;
 use controller::supervised::Phase;
 use controller::waves::{self, Wave};
 use controller::{Config, GAUGE_FAULT, PLACE_WORDS, Real, passes};
-use specgen_board::wave_refusal;
+use specgen_board::{EdgeCommand, wave_refusal};
 use specgen_link::{EdgeStatus, Health, Refusal};
 use specgen_runtime::pass::Course;
 use specgen_runtime::pending::{self, EDGE};
@@ -14,7 +14,7 @@ use specgen_runtime::playback::Knot;
 use specgen_runtime::wave::Settings;
 
 use crate::capture::{CAPACITY, Capture};
-use crate::handover::{EdgeCommand, LoopCommand, Player, Row};
+use crate::handover::{LoopCommand, Player, Row};
 use crate::operator::{Operator, SupervisorReport};
 use crate::passes::Passes;
 use crate::words::Command;
@@ -132,7 +132,7 @@ impl Console {
             number = number.wrapping_add(1);
             match order {
                 LoopCommand::Request(wish) => wish.command = None,
-                LoopCommand::Wave(_) | LoopCommand::Await(_) => {
+                LoopCommand::Wave(_) | LoopCommand::Await(..) => {
                     // In its place, so that numbers are unchanged.
                     *order = LoopCommand::StopWave;
                     self.wave.take_if(|wave| *wave == number);
@@ -157,17 +157,18 @@ impl Console {
         let limits = waves::limits(&self.config);
         let running = self.said.filter(|said| said.phase == Phase::Running);
         let Some(said) = running.filter(|_| !self.is_engaged()) else { return Err(Refusal::State) };
-        Wave::new(limits).set(settings).map_err(wave_refusal)?;
+        let mut wave = Wave::new(limits);
+        wave.set(settings).map_err(wave_refusal)?;
         waves::may_begin(said.status, self.operator.command(), &settings.center, &limits)
             .map_err(|_| Refusal::State)?;
         // The command after the wave is sent first.
         self.operator.rest_at(&settings.center);
         self.wish();
         if on_edge {
-            let number = self.order(LoopCommand::Await(EdgeCommand::Wave(*settings)));
+            let number = self.order(LoopCommand::Await(EdgeCommand::Wave, Some(wave)));
             self.awaited = Some((number, None));
         } else {
-            self.wave = Some(self.order(LoopCommand::Wave(*settings)));
+            self.wave = Some(self.order(LoopCommand::Wave(wave)));
         }
         Ok(())
     }
@@ -184,7 +185,7 @@ impl Console {
             return Err(Refusal::State);
         }
         self.wish();
-        let number = self.order(LoopCommand::Await(EdgeCommand::Command(command)));
+        let number = self.order(LoopCommand::Await(EdgeCommand::Command(command), None));
         self.awaited = Some((number, Some(command)));
         Ok(())
     }
@@ -349,7 +350,7 @@ mod tests {
         for order in console.outgoing().0.iter() {
             let moves = match order {
                 LoopCommand::Request(wish) => wish.command.is_some(),
-                LoopCommand::Wave(_) | LoopCommand::Await(_) => true,
+                LoopCommand::Wave(_) | LoopCommand::Await(..) => true,
                 _ => false,
             };
             assert!(!moves, "{order:?}");

@@ -66,7 +66,7 @@ impl<D: Device> Loop<'_, D> {
     pub fn run(mut self, account: &mut Account) {
         scheduling::touch_stack();
         let mut machine = machine_at_reset();
-        let mut setpoints = Setpoints::new(&self.config);
+        let mut setpoints = Setpoints::new();
         let Inner { outlets, mut orders, mut players } = self.rings;
         let mut keeper = Keeper::new(outlets, self.tape.take(), self.shared, (&machine, &self.config));
         let mut phase = Phase::Disarmed;
@@ -127,7 +127,7 @@ impl<D: Device> Loop<'_, D> {
             if broken || undriven {
                 events |= CONVERTER;
             }
-            let command = setpoints.next(phase, &self.config);
+            let command = setpoints.next(phase);
             let (gauge, wrench) = match read {
                 Ok(codes) => (
                     codes.map(|code| sensing::CONVERTER.reading(code)),
@@ -193,10 +193,13 @@ impl<D: Device> Loop<'_, D> {
                 keeper.ordered();
                 match order {
                     LoopCommand::Request(wish) => setpoints.wish(wish),
-                    LoopCommand::Configure(config) => (self.config, configured) = (config, true),
-                    LoopCommand::Wave(settings) => setpoints.start(&settings, &self.config),
+                    LoopCommand::Configure(config) => {
+                        (self.config, configured) = (config, true);
+                        setpoints.configure(&self.config);
+                    }
+                    LoopCommand::Wave(wave) => setpoints.start(wave),
                     LoopCommand::StopWave => setpoints.stop(),
-                    LoopCommand::Await(awaited) => setpoints.wait_for_edge(awaited),
+                    LoopCommand::Await(awaited, wave) => setpoints.wait_for_edge(awaited, wave),
                     LoopCommand::StopWaiting => setpoints.stop_waiting(),
                     LoopCommand::Pass(player) => setpoints.pass(player),
                     LoopCommand::AbortPass => setpoints.abort_pass(),
@@ -268,6 +271,7 @@ mod tests {
     use crate::capture::Capture;
     use controller::PLACE_WORDS;
     use controller::supervised::{Cause, Request};
+    use controller::waves::{self, Wave};
     use specgen_rt::clock::SECOND;
     use specgen_runtime::wave::{AxisWave, Settings, Shape};
 
@@ -618,12 +622,14 @@ mod tests {
         assert_eq!((tape.rows(), taken), (10, 4));
     }
 
-    fn wave() -> Settings<Real> {
+    fn wave() -> Wave {
         let mut settings = Settings::still();
         settings.ramp_ticks = 100;
         settings.ticks = 300;
         settings.axes[2] = AxisWave { offset: 1e-8, shape: Shape::Constant };
-        settings
+        let mut wave = Wave::new(waves::limits(&Config::new()));
+        wave.set(&settings).unwrap();
+        wave
     }
 
     #[test]

@@ -5,10 +5,12 @@ use core::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 use controller::snapshot::MACHINE_STATE_WORDS;
 use controller::snapshot::recorder::{self, Recorder};
 use controller::supervised::{MachineInput, Request};
+use controller::waves::Wave;
 use controller::{Config, PLACE_WORDS, Real};
 use rtrb::{Consumer, Producer, RingBuffer};
+use specgen_board::EdgeCommand;
 use specgen_link::{EdgeStatus, Health};
-use specgen_runtime::{pass, wave};
+use specgen_runtime::pass;
 
 use crate::words::Command;
 
@@ -72,15 +74,6 @@ pub struct OperatorRequest {
     pub request: Request,
 }
 
-/// A command that waits for the edge of the input line.
-// As orders: a box would have to be released by the real-time thread.
-#[allow(clippy::large_enum_variant)]
-#[derive(Debug, Clone, Copy)]
-pub enum EdgeCommand {
-    Command(Command),
-    Wave(wave::Settings<Real>),
-}
-
 /// A command for the loop, carried out between two ticks.
 // The ring has room for the largest variant anyway: a box would have to be released by the real-time thread.
 #[allow(clippy::large_enum_variant)]
@@ -89,10 +82,10 @@ pub enum LoopCommand {
     Request(OperatorRequest),
     Configure(Config),
     /// Starts a wave, if none is under way.
-    Wave(wave::Settings<Real>),
+    Wave(Wave),
     StopWave,
     /// To be started at the edge, in place of another waiting command.
-    Await(EdgeCommand),
+    Await(EdgeCommand, Option<Wave>),
     /// Nothing waits any more.
     StopWaiting,
     /// Starts the pass that this player was prepared for, if no wave is under way.

@@ -52,9 +52,9 @@ impl Passes {
         self.here.take_if(|player| player.begin(course))
     }
 
-    /// The player between two passes.
+    /// The player between two passes; none while it learns, when its knots are half-computed.
     pub fn player(&self) -> Option<&pass::Player<'static, Real>> {
-        self.here.as_deref()
+        self.here.as_deref().filter(|player| !player.is_busy())
     }
 
     /// Starts to compute the correction of the next pass; false if no pass is complete, or there is no plan for it.
@@ -141,7 +141,7 @@ mod tests {
         }
         passes.receive(player);
         assert!(passes.learn(Settings { reach: 0, fade: [0, 0] }));
-        assert!(!passes.put(0, [[0; 6]].into_iter()), "while it learns");
+        assert!(!passes.put(0, [[0; 6]].into_iter()) && passes.player().is_none(), "while it learns");
         passes.work();
         assert_eq!(passes.player().unwrap().correction(), [[501; 6], [502; 6], [503; 6]]);
         assert!(passes.begin(COURSE).is_some());

@@ -148,6 +148,17 @@ impl<T: Real> Wave<T> {
         self.sequence
     }
 
+    /// Continues the count of an earlier wave.
+    pub fn count_from(&mut self, sequence: u32) {
+        self.sequence = sequence;
+    }
+
+    /// Whether its settings stay within these limits.
+    #[must_use]
+    pub fn fits(&self, limits: &Limits<T>) -> bool {
+        self.settings.check(limits).is_ok()
+    }
+
     /// Takes new settings, as words ([`Settings::to_words`]).
     ///
     /// # Errors

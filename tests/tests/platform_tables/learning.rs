@@ -169,7 +169,7 @@ fn stepping(class: usize) -> &'static Bench {
 fn made(bench: &Bench, motion: &Motion, prepared: bool, count: usize) -> Vec<PassObservation> {
     let learnable = Learnable::of(&bench.emitted.compiled).unwrap();
     let spacing = 3;
-    let table = if prepared { knots(&Update::prepared(&learnable, motion, WISH, &[]), spacing) } else { Vec::new() };
+    let table = if prepared { knots(&Update::prepared(&learnable, motion, WISH), spacing) } else { Vec::new() };
     let mut controller = bench.controller();
     let mut machine = bench.scenario().rig().clone();
     let mut rig = Rig::new(&mut machine, &mut controller, PERIOD, 0).unwrap();

@@ -5,7 +5,7 @@ use specgen_language::outcome::Failure;
 use specgen_language::ui::Ui;
 use specgen_studies::build::{self, Options};
 
-use super::named::{InputFile, OutputFolder};
+use super::path_roles::{InputFile, OutputFolder};
 
 /// Arguments of the main job.
 #[derive(Args, Debug)]

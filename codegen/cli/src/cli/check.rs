@@ -5,7 +5,7 @@ use specgen_language::outcome::Failure;
 use specgen_language::ui::Ui;
 use specgen_studies::check;
 
-use super::named::InputFile;
+use super::path_roles::InputFile;
 
 /// Arguments of `check`.
 #[derive(Args, Debug)]

@@ -2,7 +2,7 @@
 
 use clap::Args;
 
-use super::named::InputFile;
+use super::path_roles::InputFile;
 use super::plot::Plot;
 use specgen_compiler::spec_file;
 use specgen_language::outcome::Failure;

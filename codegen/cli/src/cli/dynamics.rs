@@ -5,7 +5,7 @@ use specgen_language::outcome::Failure;
 use specgen_language::ui::Ui;
 use specgen_studies::dynamics;
 
-use super::named::{InputFile, OutputFile};
+use super::path_roles::{InputFile, OutputFile};
 
 /// Arguments of `dynamics`.
 #[derive(Args, Debug)]

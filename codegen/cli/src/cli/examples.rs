@@ -47,6 +47,13 @@ Examples:
   specgen check platform.toml --json
       the same, with margins, reach and precision, for programs";
 
+pub const DESIGN: &str = "\
+Examples:
+  specgen design platform.toml         # (minutes) needs control.active_damping
+
+The design depends on geometry, masses, stiffness, lags, known modes and
+[robust.structure]. After a change of these, run it again.";
+
 pub const EXPLAIN: &str = "\
 Examples:
   specgen explain E0441     # a code printed by `specgen check`

@@ -5,7 +5,7 @@ use specgen_language::outcome::Failure;
 use specgen_language::ui::Ui;
 use specgen_studies::export;
 
-use super::named::{InputFile, OutputFolder};
+use super::path_roles::{InputFile, OutputFolder};
 
 /// Arguments of `export`.
 #[derive(Args, Debug)]

@@ -7,7 +7,7 @@ use specgen_language::ui::Ui;
 use specgen_studies::firmware::{self, Options, flash, size};
 use specgen_toolchain::targets::NAMES;
 
-use super::named::{InputFile, OutputFolder};
+use super::path_roles::{InputFile, OutputFolder};
 
 /// Arguments common to these commands.
 #[derive(Args, Debug)]

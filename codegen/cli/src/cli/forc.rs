@@ -8,8 +8,8 @@ use specgen_report::reversal_curves::Curves;
 use specgen_studies::reversal_curves::Experiment;
 
 use super::identify::range;
-use super::named::{InputFile, OutputFile};
 use super::number::number;
+use super::path_roles::{InputFile, OutputFile};
 use super::plot::Plot;
 use super::sim::PlantArguments;
 

@@ -10,7 +10,7 @@ use specgen_language::ui::Ui;
 use specgen_operate::gcs::{self, Axes};
 
 use super::line::Line;
-use super::named::InputFile;
+use super::path_roles::InputFile;
 
 /// Arguments of `gcs`.
 #[derive(Args, Debug)]

@@ -10,8 +10,8 @@ use specgen_language::outcome::Failure;
 use specgen_language::ui::Ui;
 use specgen_report::identify::{Bench, estimates, everett, gains, linear, predict, rate};
 
-use super::named::{InputFile, OutputFile, OutputFolder};
 use super::number::number;
+use super::path_roles::{InputFile, OutputFile, OutputFolder};
 use super::plot::Plot;
 
 /// Arguments of `identify`.

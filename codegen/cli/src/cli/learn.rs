@@ -12,7 +12,7 @@ use specgen_studies::factors::UserRange;
 use specgen_studies::lessons::{self, Options};
 
 use super::line::Line;
-use super::named::{InputFile, OutputFile};
+use super::path_roles::{InputFile, OutputFile};
 use super::sim::{PlantArguments, bandwidth, frequency};
 
 /// Arguments of `learn`.

@@ -6,7 +6,7 @@ use specgen_link::client::Port;
 use specgen_operate::Session;
 use specgen_operate::pil::BAUD;
 
-use super::named::Endpoint;
+use super::path_roles::Endpoint;
 
 /// A serial port or a socket.
 #[derive(Args, Debug)]

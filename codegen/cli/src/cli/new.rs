@@ -7,7 +7,7 @@ use specgen_language::ui::Ui;
 use specgen_studies::begin::questions::QUESTIONS;
 use specgen_studies::begin::{self, Answers};
 
-use super::named::OutputFolder;
+use super::path_roles::OutputFolder;
 
 /// Arguments of `new`.
 #[derive(Args, Debug)]

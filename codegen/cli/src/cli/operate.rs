@@ -9,7 +9,7 @@ use specgen_operate::Command;
 use specgen_operate::commands::{self, Source};
 
 use super::line::Line;
-use super::named::InputFile;
+use super::path_roles::InputFile;
 
 /// Arguments of `operate`.
 #[derive(Args, Debug)]

@@ -11,7 +11,7 @@ use specgen_operate::panel;
 use specgen_report::panel::{facts, html};
 
 use super::line::Line;
-use super::named::InputFile;
+use super::path_roles::InputFile;
 
 /// Arguments of `panel`.
 #[derive(Args, Debug)]

@@ -8,7 +8,7 @@ use specgen_language::ui::Ui;
 use specgen_operate::pil::{self, BAUD, Options, Run};
 use specgen_report::sim::{chart_of_legs, chart_of_platform};
 
-use super::named::{Endpoint, InputFile, OutputFolder};
+use super::path_roles::{Endpoint, InputFile, OutputFolder};
 use super::plot::Plot;
 use super::sim::{PlantArguments, frequency};
 

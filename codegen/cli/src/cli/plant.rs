@@ -5,13 +5,13 @@ use host_sim::machine::Machine;
 use specgen_compiler::{lower, spec_file};
 use specgen_rt::exchange;
 
-use super::named::InputFile;
 use super::number::number;
+use super::path_roles::InputFile;
 use super::sim::PlantArguments;
 use specgen_compiler::compile::Compilation;
 use specgen_language::outcome::Failure;
 use specgen_language::ui::Ui;
-use specgen_operate::served::{Options, serve};
+use specgen_operate::plant_server::{Options, serve};
 use specgen_runtime::supervisor::Finding;
 use specgen_studies::machine;
 

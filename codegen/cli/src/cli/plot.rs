@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use specgen_report::drawing::{self, is_page};
 
-use super::named::OutputFile;
+use super::path_roles::OutputFile;
 
 #[derive(Args, Debug)]
 pub struct Plot {

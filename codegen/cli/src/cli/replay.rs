@@ -5,7 +5,7 @@ use specgen_language::outcome::Failure;
 use specgen_language::ui::Ui;
 use specgen_report::replay;
 
-use super::named::{InputFile, OutputFile};
+use super::path_roles::{InputFile, OutputFile};
 use super::plot::Plot;
 
 /// Arguments of `replay`.

@@ -5,7 +5,7 @@ use specgen_language::outcome::Failure;
 use specgen_language::ui::Ui;
 use specgen_report::pages::{self, Options};
 
-use super::named::{InputFile, OutputFile};
+use super::path_roles::{InputFile, OutputFile};
 
 /// Arguments of `report`.
 #[derive(Args, Debug)]

@@ -5,7 +5,7 @@ use specgen_language::outcome::Failure;
 use specgen_language::ui::Ui;
 use specgen_report::reproduce;
 
-use super::named::OutputFolder;
+use super::path_roles::OutputFolder;
 use super::plot::Plot;
 
 /// Arguments of `reproduce`.

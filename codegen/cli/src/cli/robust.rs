@@ -9,8 +9,8 @@ use specgen_report::robust::{self, Options};
 use specgen_studies::robust::Shard;
 use specgen_studies::robust::factors::UserRange;
 
-use super::named::{InputFile, OutputFolder};
 use super::number::number;
+use super::path_roles::{InputFile, OutputFolder};
 use super::plot::Plot;
 use super::sim::{PlantArguments, frequency};
 

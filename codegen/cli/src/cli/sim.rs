@@ -8,8 +8,8 @@ use specgen_language::ui::Ui;
 use specgen_report::sim::{self as report, Options};
 use specgen_studies::machine::PlantOptions;
 
-use super::named::{InputFile, OutputFile, OutputFolder};
 use super::number::number;
+use super::path_roles::{InputFile, OutputFile, OutputFolder};
 use super::plot::Plot;
 
 /// Arguments of `sim`.

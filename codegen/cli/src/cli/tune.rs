@@ -7,8 +7,8 @@ use specgen_report::tune::{self, Options};
 use specgen_studies::tuning::TunedNumbers;
 use specgen_studies::tuning::space::GivenBounds;
 
-use super::named::{InputFile, OutputFolder};
 use super::number::number;
+use super::path_roles::{InputFile, OutputFolder};
 use super::plot::Plot;
 use super::sim::{PlantArguments, frequency};
 

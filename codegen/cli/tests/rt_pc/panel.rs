@@ -13,7 +13,7 @@ use std::time::{Duration, Instant};
 
 use rustix::process::Signal;
 use serde_json::{Value, json};
-use specgen::{compile, machine, served};
+use specgen::{compile, machine, plant_server};
 use specgen_link::Status;
 use specgen_rt::exchange::{Server, path_of};
 use tungstenite::client::IntoClientRequest;
@@ -382,7 +382,7 @@ impl MiswiredMachine {
         let noise = host_sim::platform::rig::Noise::of(&specimen);
         let scenario = machine::scenario(&compiled.model, task, &specimen, &noise, 1);
         let plant = host_sim::machine::Machine::Platform(Box::new(scenario.rig().clone()));
-        let mut served = served::PlantServer::new(plant, &compiled.model, &compiled.ir);
+        let mut plant_server = plant_server::PlantServer::new(plant, &compiled.model, &compiled.ir);
         let server = Server::create(&path_of(name).unwrap(), digest).unwrap();
         let stop = Arc::new(AtomicBool::new(false));
         let ends = stop.clone();
@@ -390,7 +390,7 @@ impl MiswiredMachine {
             let mut seen = 0;
             while !ends.load(Ordering::Relaxed) {
                 if let Some((actuation, wanted)) = server.wait(&mut seen, 0, 50_000_000) {
-                    server.publish(&served.answer(&actuation, wanted));
+                    server.publish(&plant_server.answer(&actuation, wanted));
                 }
             }
         });

@@ -27,7 +27,7 @@ pub fn emit(ir: &Ir) -> TokenStream {
         ),
     };
     quote! {
-        #![doc = " What the controller checks itself by, see [`crate::integrity`]."]
+        #![doc = " Data for the controller's integrity check, see [`crate::integrity`]."]
 
         use core::hint::black_box;
 
@@ -38,11 +38,11 @@ pub fn emit(ir: &Ir) -> TokenStream {
         /// CRC-32 (ISO-HDLC) of [`IDENTITY`], the tables, the trajectories and [`SETTINGS`]; computed by specgen.
         pub const CRC: u32 = #crc;
 
-        /// The spec's settings, in the order of [`crate::CONFIG_NAMES`]: what `Config::new().to_words()` gives.
+        /// The spec's settings, in the order of [`crate::CONFIG_NAMES`]: the value of `Config::new().to_words()`.
         pub static SETTINGS: [u64; CONFIG_WORDS] = [#(#settings),*];
 
-        /// Where this controller comes from, in one line, and what of that nobody measured, in a second. It lies in every image
-        /// whose target asks [`intact`](crate::integrity::intact); `specgen size` prints it, and `specgen flash` asks about the second.
+        /// Origin of this controller, in one line, and its unmeasured values, in a second. It is part of every image
+        /// whose target calls [`intact`](crate::integrity::intact). `specgen size` prints it; `specgen flash` asks about line 2.
         pub static IDENTITY: [u8; #length] = *#identity;
 
         /// Adds tables and trajectories.

@@ -42,7 +42,7 @@ fn legs(ir: &Ir) -> (TokenStream, TokenStream) {
     let run_interval = literal::count(d.run_interval as usize);
     let code_limits = code_limits(ir);
     let constants = quote! {
-        /// What `Config::new` holds.
+        /// Values of `Config::new`.
         pub(crate) const DEFAULTS: Settings<Constants> = Settings {
             law: Law::#law,
             setpoint: SetpointKind::#setpoint,
@@ -76,7 +76,7 @@ fn platform(ir: &Ir, d: &PlatformDefaults) -> (TokenStream, TokenStream) {
     let [damps, position_damps] =
         [&d.gains, &d.position_gains].map(|gains| gains.derivative.iter().any(|gain| ir.scalar.round(*gain) != 0.0));
     let constants = quote! {
-        /// What `Config::new` holds.
+        /// Values of `Config::new`.
         pub(crate) const DEFAULTS: Settings<Constants> = Settings {
             mode: ControlMode::#mode #with_law,
             interaction: Interaction::#interaction,
@@ -93,7 +93,7 @@ fn platform(ir: &Ir, d: &PlatformDefaults) -> (TokenStream, TokenStream) {
         pub const LINES: usize = #lines;
         /// Whether there is an input line; from `trigger`.
         pub const INPUT: bool = #input;
-        /// What each output shows.
+        /// Source of each output.
         pub(crate) const TRIGGERS: [Line<Real>; LINES] = #triggers;
     };
     let imports = quote! {

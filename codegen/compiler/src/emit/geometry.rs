@@ -31,7 +31,7 @@ pub fn emit(ir: &Ir) -> TokenStream {
         pub const INVERSE_JACOBIAN: [[Real; LEGS]; 6] = #inverse;
         /// Largest |x|, |y|, |z| (m) and |θx|, |θy|, |θz| (rad) accepted; from `workspace`.
         pub(crate) const POSE_BOUND: [Real; 6] = [#pose_bound];
-        /// Corrections of the forward kinematics: what they leave over the declared workspace is below 1e-13 m and rad, or
+        /// Corrections of the forward kinematics. Over the declared workspace, their error is below 1e-13 m and rad, or
         /// the last bit.
         pub(crate) const CORRECTIONS: usize = #corrections;
     }

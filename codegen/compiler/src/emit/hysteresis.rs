@@ -19,11 +19,11 @@ pub fn emit(ir: &Ir) -> TokenStream {
         let (ticks, limit) = h.lead.as_ref().map_or((0.0, 0.0), |lead| (lead.ticks, lead.limit));
         let (ticks, limit, led) = (literal::real(ir.scalar, ticks), literal::real(ir.scalar, limit), h.lead.is_some());
         quote! {
-            /// Whether legs are asked to be ahead, for their dead time.
+            /// Whether the set-points of the legs lead, to compensate their dead time.
             pub const LED: bool = #led;
-            /// Lead of the leg displacements asked for, ticks; from `hysteresis.dead_time`.
+            /// Lead of the leg set-points, ticks; from `hysteresis.dead_time`.
             pub const LEAD: Real = #ticks;
-            /// Most that it adds to a demand, m; from `actuator.slew_rate`.
+            /// Largest lead that is added to a demand, m; from `actuator.slew_rate`.
             pub const LEAD_LIMIT: Real = #limit;
         }
     });

@@ -34,10 +34,10 @@ pub fn emit(ir: &Ir) -> TokenStream {
         pub const SPEC_DIGEST: &str = #digest;
         /// Version of the compiler.
         pub const SPECGEN_VERSION: &str = #version;
-        /// What nobody measured: paths of the spec whose values are assumed, and simulated records. A program that drives a real machine
-        /// asks its user first where this is not empty. Nothing of it is in the law.
+        /// Unmeasured values: paths of the spec whose values are assumed, and simulated records. A program that drives
+        /// a real machine asks its user first if the list is not empty. The law does not use it.
         pub const ASSUMED: &[&str] = &[#(#assumed),*];
-        /// What this controller is, one `key=value` a line, lists separated by commas: for tools that load it at run time.
+        /// Description of this controller: one `key=value` per line, lists separated by commas; for tools that load it.
         pub const DESCRIPTION: &str = #description;
     }
 }

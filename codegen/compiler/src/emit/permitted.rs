@@ -29,7 +29,7 @@ pub fn emit(ir: &Ir) -> TokenStream {
         pub(crate) const WORDS: usize = #words;
         /// Their names.
         pub(crate) const NAMES: [&str; WORDS] = [#(#names),*];
-        /// Ranges of the words of [`crate::CONFIG_NAMES`] in their order, both ends included, each for so many words; `code_min` is at
+        /// Ranges of the words, in the order of [`crate::CONFIG_NAMES`], ends included, with their numbers of words; `code_min` is at
         /// most `code_max`.
         pub const SETTINGS: [(PermittedRange<Real>, usize); #count] = #settings;
         /// Largest numbers of a state, under any of these settings.

@@ -27,7 +27,7 @@ pub fn emit(ir: &Ir, s: &Setpoints) -> TokenStream {
 
         use crate::Real;
 
-        /// What the generator of set-points needs to know; from `control.setpoint`, `control.frames`, `workspace`, `timing.period`
+        /// Parameters of the set-point generator; from `control.setpoint`, `control.frames`, `workspace`, `timing.period`
         /// and `trajectory`.
         pub const SETPOINTS: Setpoints<Real, UserFrames> = #setpoints;
 

@@ -30,9 +30,9 @@ pub fn emit(ir: &Ir) -> TokenStream {
             quote! {
                 /// Reading of each gauge (rows) per displacement of each leg (columns): each leg has its own.
                 pub const READINGS_PER_LEG: [[Real; 6]; 6] = [#(#own),*];
-                /// What is left after a tick of the way to the set-point when the law begins; from `supervisor.arm_time`.
+                /// Fraction of the distance to the set-point left after a tick, when the law starts; from `supervisor.arm_time`.
                 pub const APPROACH_KEEP: Real = #keep;
-                /// A way this short, m and rad, is none.
+                /// Distance below which the set-point is reached, m and rad.
                 pub const APPROACH_NEGLIGIBLE: Real = 1e-13;
             }
         }
@@ -51,7 +51,7 @@ pub fn emit(ir: &Ir) -> TokenStream {
         use crate::hysteresis::Memory;
         use crate::{Real #limits};
 
-        /// Bounds and times, these in ticks, or in samples of six ticks.
+        /// Bounds and times. Times are in ticks, or in samples of six ticks.
         pub const SUPERVISION: Supervision<Real> = #supervision;
         /// Sets of single faults that look alike to the wiring check, as words of `Finding`.
         pub const LOOK_ALIKE: &[&[u32]] = &[#(&[#alike]),*];

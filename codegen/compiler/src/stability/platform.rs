@@ -38,7 +38,7 @@ pub use law::{LoopKind, Tuning, start_law, start_mode};
 pub use margins::{ClosedMode, ModeMargins};
 pub use modes::ModalBasis;
 pub use notch::{Biquad, Notch};
-pub use report::describe;
+pub use report::{describe, describe_damping};
 pub use rule::bandwidth_limit;
 pub use structure::{Border, StructuralChannel, StructureDemand};
 

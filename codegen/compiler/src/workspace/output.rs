@@ -11,8 +11,8 @@ use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
+use super::contents::{MANIFEST, Manifest, WORK, check_free, entries};
 use super::error::WriteError;
-use super::found::{MANIFEST, Manifest, WORK, check_free, entries};
 use super::hold::Hold;
 use specgen_language::files::sync;
 use specgen_language::interrupt;

@@ -34,6 +34,7 @@ const ABOUT: f64 = 0.25;
 const STIFFNESSES: u32 = 5;
 
 /// A loop for which learning is possible.
+#[derive(Debug, Clone)]
 pub struct Learnable {
     pub(super) closed_loop: ClosedLoop,
     law: ControlMode,
@@ -192,6 +193,13 @@ impl Learnable {
     ) -> Vec<Matrix6c> {
         let angles: Vec<f64> = frequencies.iter().map(|hertz| TAU * hertz * closed_loop.period).collect();
         closed_loop.correction_response(self.law, &self.tuning, conditions, &angles)
+    }
+
+    /// The same with gauges that see the pose itself: what a motion that is known beforehand is prepared for.
+    pub(super) fn of_pose(&self) -> Self {
+        let mut all = self.clone();
+        all.closed_loop.structure.retain(|one| !one.on_readings());
+        all
     }
 
     /// G: the response without feedback.

@@ -84,12 +84,13 @@ impl Update {
     /// A correction that compensates lag and modes by the model, before the first pass.
     ///
     /// ```text
-    /// c = Q G⁻¹ (x_d/H − G r)      r = x_d + τ Δx_d/T_s + ẍ_d/ω², per mode: the request to the legs with lead and load
-    /// H = Π ω²/(s² + 2 ζ ω s + ω²)  over `legs`: modes of each leg (Hz and damping ratio) in series with its length
+    /// c = Q G⁻¹ (x_d − G r)      r = x_d + τ Δx_d/T_s + ẍ_d/ω², per mode: the request to the legs with lead and load
     /// ```
-    /// G is the open-loop channel from the request to the gauges, and Q that of f_c (Hz), without phase.
+    /// G is the open-loop channel from the request to the pose, with the structural modes of the legs that are known, and Q that of f_c
+    /// (Hz), without phase.
     #[must_use]
-    pub fn prepared(learnable: &Learnable, motion: &Motion, bandwidth: f64, legs: &[(f64, f64)]) -> Vec<[f64; 6]> {
+    pub fn prepared(learnable: &Learnable, motion: &Motion, bandwidth: f64) -> Vec<[f64; 6]> {
+        let learnable = &learnable.of_pose();
         let closed_loop = &learnable.closed_loop;
         let update = Self::of(learnable, motion, bandwidth, 1, |frequencies| {
             let channel = learnable.open_loop(frequencies);
@@ -99,28 +100,11 @@ impl Update {
                 .map(|(response, hertz)| (inverse(response), low_pass(*hertz, bandwidth)))
                 .collect()
         });
-        let [wanted, rates, requests] = requested(learnable, motion);
+        let [wanted, requests] = requested(learnable, motion);
         let shown = closed_loop.without_feedback(&requests);
         let error: Vec<[f64; 6]> =
             wanted.iter().zip(&shown).map(|(a, b)| std::array::from_fn(|mode| a[mode] - b[mode])).collect();
-        let mut missed = update.transformed(error);
-        if !legs.is_empty() {
-            // x_d/H − x_d from ẋ_d, which is 0 at both ends, as x_d is not.
-            let lead = |hertz: f64| {
-                let s = Complex64::new(0.0, TAU * hertz);
-                let inverse = legs.iter().fold(Complex64::new(1.0, 0.0), |product, (natural, damping)| {
-                    let r = s / (TAU * natural);
-                    product * (1.0 + 2.0 * damping * r + r * r)
-                });
-                (inverse - 1.0) / s
-            };
-            let hertz = frequencies(update.length, bandwidth, closed_loop.period);
-            for (missed, rates) in missed.iter_mut().zip(update.transformed(rates)) {
-                for ((missed, rate), hertz) in missed.iter_mut().zip(rates).zip(&hertz) {
-                    *missed += lead(*hertz) * rate;
-                }
-            }
-        }
+        let missed = update.transformed(error);
         let zeros = vec![[0.0; 6]; motion.corrected];
         update.corrected(&update.spectra(&zeros), &missed, zeros.len())
     }
@@ -232,14 +216,14 @@ impl Update {
     }
 }
 
-/// Pose from the start, its rate, and the request to the legs with lead and load, tick by tick in modal coordinates.
-fn requested(learnable: &Learnable, motion: &Motion) -> [Vec<[f64; 6]>; 3] {
+/// Pose from the start, and the request to the legs with lead and load, tick by tick in modal coordinates.
+fn requested(learnable: &Learnable, motion: &Motion) -> [Vec<[f64; 6]>; 2] {
     let closed_loop = &learnable.closed_loop;
     let start = motion.targets[0].pose;
     let modal = |pose: &[f64; 6]| mapped(&closed_loop.basis.to_modal, pose);
     let lead = learnable.lead / closed_loop.period;
     let mut last = [0.0; 6];
-    let mut all = [const { Vec::new() }; 3];
+    let mut all = [const { Vec::new() }; 2];
     for target in &motion.targets[..motion.corrected] {
         let place = modal(&std::array::from_fn(|axis| target.pose[axis] - start[axis]));
         let bend = modal(&target.acceleration);
@@ -248,7 +232,7 @@ fn requested(learnable: &Learnable, motion: &Motion) -> [Vec<[f64; 6]>; 3] {
             place[mode] + lead * (place[mode] - last[mode]) + bend[mode] / (frequency * frequency)
         });
         last = place;
-        for (signal, value) in all.iter_mut().zip([place, modal(&target.rate), request]) {
+        for (signal, value) in all.iter_mut().zip([place, request]) {
             signal.push(value);
         }
     }
@@ -282,6 +266,8 @@ mod tests {
 
     use host_sim::trajectory::{PaperPath, PaperPose, Step};
     use specgen_compiler::compile::compile;
+    use specgen_compiler::stability::platform::StructuralChannel;
+    use specgen_numerics::nyquist::Flexure;
     use specgen_runtime::playback::{self, Knot};
 
     use super::*;
@@ -329,11 +315,19 @@ mod tests {
         let (learnable, _) = reference();
         let step = Step { to: [1e-6, 0.0, 0.0, 0.0, 2e-6, 0.0], time: 5e-3 };
         let motion = Motion::of(&step, PERIOD, &SPEED, RADIUS).unwrap();
-        let [wanted, _, requests] = requested(&learnable, &motion);
+        let [wanted, requests] = requested(&learnable, &motion);
         let basis = &learnable.closed_loop.basis;
         // rms error of the open loop, nm.
         let left = |real: &[(f64, f64)], known: &[(f64, f64)]| {
-            let correction = Update::prepared(&learnable, &motion, 800.0, known);
+            let structure = known.iter().map(|(hertz, damping)| StructuralChannel {
+                flexure: Flexure::Series,
+                frequency: TAU * hertz,
+                damping_ratio: *damping,
+                place: None,
+            });
+            let mut modelled = learnable.clone();
+            modelled.closed_loop.structure = structure.collect();
+            let correction = Update::prepared(&modelled, &motion, 800.0);
             let given: Vec<[f64; 6]> = requests
                 .iter()
                 .zip(&correction)

@@ -137,7 +137,7 @@ impl Deviation {
         nominal.modal_damping = damped(nominal.modal_damping, self.damping);
         nominal.force_noise.iter_mut().for_each(|noise| *noise *= self.noise);
         if let Some(shares) = &self.structure {
-            shares.add_to(&mut nominal.imperfections, &StructureRange::of(&known));
+            shares.add_to(&mut nominal.imperfections, &StructureRange::of(model, &known));
         }
         specimen
     }

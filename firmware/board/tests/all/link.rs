@@ -41,14 +41,14 @@ fn a_wave_is_refused_with_its_reason_and_a_host_that_falls_silent_ends_it() {
     assert_eq!(why(start(&mut client, &far)), wave::Refusal::Range(2));
     assert_eq!(why(start(&mut client, &wave(2e-5, 60.0))), wave::Refusal::Rate(0));
     assert_eq!(why(start(&mut client, &wave(2e-7, 2600.0))), wave::Refusal::Acceleration(0));
-    assert!(!line.with(|rig| rig.exchange.waves()));
+    assert!(!line.with(|rig| rig.exchange.source.waves()));
     assert_eq!(start(&mut client, &wave(1e-6, 5.0)), None);
     line.tick(100);
-    let waving = line.with(|rig| (rig.exchange.waves(), rig.exchange.report.status));
+    let waving = line.with(|rig| (rig.exchange.source.waves(), rig.exchange.report.status));
     assert_eq!((waving.0, waving.1 & controller::SETPOINT_FAULT), (true, 0));
     // 0.1 s of silence: the supervisor holds.
     line.tick(1100);
-    assert!(!line.with(|rig| rig.exchange.waves()));
+    assert!(!line.with(|rig| rig.exchange.source.waves()));
     assert_eq!(line.phase(), Phase::Holding);
 }
 

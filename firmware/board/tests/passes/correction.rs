@@ -48,7 +48,7 @@ fn pass(client: &mut Client<Line>, action: PassAction) -> PassStatus {
 }
 
 fn stage(line: &Line) -> Stage {
-    line.with(|rig| rig.exchange.player.as_ref().unwrap().stage())
+    line.with(|rig| rig.exchange.source.player.as_ref().unwrap().stage())
 }
 
 fn given(line: &Line) -> ([Real; 6], [u64; 2]) {
@@ -78,7 +78,7 @@ fn a_pass_gives_every_tick_its_correction_and_begins_the_trajectory_behind_the_r
     let status = pass(&mut client, BEGIN);
     let capacity = KNOTS_OF_A_PASS as u32;
     assert_eq!(status, PassStatus { stage: Stage::Running.word(), status: 0, knots: 0, capacity });
-    assert!(line.with(|rig| rig.exchange.is_engaged() && !rig.exchange.waves()));
+    assert!(line.with(|rig| rig.exchange.source.is_engaged() && !rig.exchange.source.waves()));
     let mut seen = 0;
     for tick in 0..=TICKS {
         let (correction, command) = given(&line);
@@ -107,7 +107,7 @@ fn a_pass_gives_every_tick_its_correction_and_begins_the_trajectory_behind_the_r
     // More than one answer holds, from any byte on.
     assert_eq!(knots(&client.fetch(|offset| Request::Correction { offset }).unwrap()), table);
     let whole = client.fetch(|offset| Request::Errors { offset }).unwrap();
-    let kept = line.with(|rig| rig.exchange.player.as_ref().unwrap().errors().to_vec());
+    let kept = line.with(|rig| rig.exchange.source.player.as_ref().unwrap().errors().to_vec());
     assert!(knots(&whole) == kept && kept.len() == KNOTS_PLAYED && kept.iter().any(|knot| *knot != [0; 6]));
     for offset in [0, 1, KNOT - 1, KNOT, 3 * KNOT + 5, whole.len() - 1, whole.len(), whole.len() + 7] {
         match client.ask(&Request::Errors { offset: offset as u32 }).unwrap() {
@@ -149,7 +149,7 @@ fn a_pass_begins_in_a_machine_that_runs_at_rest_and_nowhere_else() {
     done(&mut client, &Request::Wave { action: WaveAction::Start, words: Bytes(&words) });
     assert_eq!(refused(&mut client, &begin), Refusal::State);
     untouched(&line, "busy");
-    line.with(|rig| rig.exchange.wave = None);
+    line.with(|rig| rig.exchange.source.wave = None);
     line.with(|rig| rig.exchange.lockstep = Some(specgen_link::Silence::new(1000)));
     assert_eq!(refused(&mut client, &begin), Refusal::State);
     line.with(|rig| rig.exchange.lockstep = None);
@@ -170,7 +170,7 @@ fn a_pass_begins_in_a_machine_that_runs_at_rest_and_nowhere_else() {
     untouched(&line, "refused");
     assert_eq!(pass(&mut client, BEGIN).stage, Stage::Running.word());
     // Without memory there are none.
-    line.with(|rig| rig.exchange.player = None);
+    line.with(|rig| rig.exchange.source.player = None);
     for request in [begin, Request::Errors { offset: 0 }, Request::Knots { first: 0, knots: Bytes(&number) }] {
         assert_eq!(refused(&mut client, &request), Refusal::Unsupported);
     }
@@ -199,16 +199,16 @@ fn a_pass_that_is_ended_corrects_nothing_from_the_next_tick_on() {
         assert_ne!(given(&line).0, [0.0; 6]);
         end(&line, &mut client);
         assert_eq!((stage(&line), given(&line).0), (Stage::Aborted, [0.0; 6]));
-        assert!(!line.with(|rig| rig.exchange.is_engaged()));
+        assert!(!line.with(|rig| rig.exchange.source.is_engaged()));
         line.tick(100);
         assert_eq!((stage(&line), given(&line).0), (Stage::Aborted, [0.0; 6]));
-        assert!(line.with(|rig| rig.exchange.player.as_ref().unwrap().errors().len()) < KNOTS_PLAYED);
+        assert!(line.with(|rig| rig.exchange.source.player.as_ref().unwrap().errors().len()) < KNOTS_PLAYED);
     }
 }
 
 /// What a host is told while the background has the player.
 fn in_the_background(exchange: &mut Exchange, machine: &mut Machine) {
-    assert!(exchange.player.is_none());
+    assert!(exchange.source.player.is_none());
     ask(exchange, machine, Request::Pass { action: PassAction::Look }, |reply| {
         let Reply::Pass(status) = reply else { unreachable!("{reply:?}") };
         assert_eq!((status.stage, status.knots), (Stage::Learning.word(), 0));
@@ -232,7 +232,7 @@ fn looks_only(rig: &mut Rig) {
     let mut looks = 0;
     learn(&mut |action| {
         action(&mut rig.exchange, rig.board.machine_mut());
-        assert!(rig.exchange.player.is_some());
+        assert!(rig.exchange.source.player.is_some());
         looks += 1;
     });
     assert_eq!(looks, 1);
@@ -259,7 +259,7 @@ fn the_background_learns_between_passes_and_says_so_meanwhile() {
     assert_eq!(refused(&mut client, &Request::Pass { action: learning }), Refusal::State, "it is under way");
     line.with(looks_only);
     wait(&line, &mut client, "the end of the pass", |line| stage(line) == Stage::Complete);
-    let errors = line.with(|rig| rig.exchange.player.as_ref().unwrap().errors().to_vec());
+    let errors = line.with(|rig| rig.exchange.source.player.as_ref().unwrap().errors().to_vec());
     line.with(|rig| (rig.pace, rig.busy) = (0, true));
     assert_eq!(pass(&mut client, learning).stage, Stage::Learning.word());
     assert_eq!(refused(&mut client, &Request::Pass { action: BEGIN }), Refusal::State);

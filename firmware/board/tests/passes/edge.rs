@@ -101,14 +101,14 @@ fn a_wave_that_waits_begins_with_the_tick_after_the_edge() {
     let start = Request::Wave { action: WaveAction::StartOnEdge, words: Bytes(&words) };
     done(&mut client, &start);
     line.tick(5);
-    assert!(!line.with(|rig| rig.exchange.waves()) && line.with(|rig| rig.exchange.wave.is_some()));
+    assert!(!line.with(|rig| rig.exchange.source.waves()) && line.with(|rig| rig.exchange.source.wave.is_some()));
     let at = rise(&line);
     assert_eq!(edge(&mut client), EdgeStatus { stage: Stage::Begun.word() as u8, edges: 1, tick: at });
-    assert!(line.with(|rig| rig.exchange.waves()));
+    assert!(line.with(|rig| rig.exchange.source.waves()));
     assert_eq!(kind(&line), CommandKind::Stream.word());
     // A stop drops what waits and lets a wave that is under way come to rest.
     done(&mut client, &Request::Wave { action: WaveAction::Stop, words: Bytes(&[]) });
-    assert!(line.with(|rig| rig.exchange.waves()));
+    assert!(line.with(|rig| rig.exchange.source.waves()));
 }
 
 #[test]
@@ -121,7 +121,7 @@ fn only_a_machine_that_runs_at_rest_waits_for_an_edge() {
         let on_edge = Request::Wave { action: WaveAction::StartOnEdge, words: Bytes(&settings) };
         assert_eq!(refused(&mut client, &on_edge), Refusal::State, "{why}");
         assert_eq!(stage(&mut client), Stage::None.word(), "{why}");
-        assert!(line.with(|rig| rig.exchange.wave.as_ref().is_none_or(|_| rig.exchange.waves())), "{why}");
+        assert!(line.with(|rig| rig.exchange.source.wave.as_ref().is_none_or(|_| rig.exchange.source.waves())), "{why}");
     };
     for phase in [Phase::Disarmed, Phase::Arming, Phase::Holding, Phase::RampingDown, Phase::Faulted] {
         line.with(|rig| rig.exchange.report.phase = phase);
@@ -138,13 +138,13 @@ fn only_a_machine_that_runs_at_rest_waits_for_an_edge() {
     let mut other = line.client(3);
     other.ask(&Request::Pass { action: begin }).unwrap();
     let mut client = line.client(4);
-    line.with(|rig| assert!(!rig.exchange.is_engaged()));
+    line.with(|rig| assert!(!rig.exchange.source.is_engaged()));
     client.ask(&Request::Pass { action: begin }).unwrap();
     assert_eq!(refused(&mut client, &Request::SetpointOnEdge { words: Bytes(&command) }), Refusal::State);
     client.ask(&Request::Pass { action: PassAction::Abort }).unwrap();
     done(&mut client, &Request::Wave { action: WaveAction::Start, words: Bytes(&settings) });
     assert_eq!(refused(&mut client, &Request::SetpointOnEdge { words: Bytes(&command) }), Refusal::State);
-    assert!(line.with(|rig| rig.exchange.waves()));
+    assert!(line.with(|rig| rig.exchange.source.waves()));
     let short = Request::SetpointOnEdge { words: Bytes(&command[..8]) };
     assert_eq!(refused(&mut client, &short), Refusal::Length { expected: COMMAND_WORDS as u16 });
 }
@@ -173,7 +173,7 @@ fn what_waits_is_refused_at_an_edge_in_motion() {
         let at = number(&line);
         line.tick(1);
         assert_eq!(edge(&mut client), EdgeStatus { stage: Stage::Refused.word() as u8, edges: 1, tick: at });
-        assert!(!line.with(|rig| rig.exchange.waves()), "{order:?}");
+        assert!(!line.with(|rig| rig.exchange.source.waves()), "{order:?}");
         assert_eq!(kind(&line), CommandKind::Move.word());
         // And so is it behind a trajectory, and while a pass is under way.
         for engaged in [false, true] {
@@ -185,7 +185,7 @@ fn what_waits_is_refused_at_an_edge_in_motion() {
                 let exchange = &mut rig.exchange;
                 if engaged {
                     let course = specgen_runtime::pass::Course { spacing: 10, before: 50, ticks: 100, trajectory: 0 };
-                    assert!(exchange.player.as_mut().unwrap().begin(course));
+                    assert!(exchange.source.player.as_mut().unwrap().begin(course));
                 } else if matches!(order, Request::Wave { .. }) {
                     exchange.orders.command[0] = CommandKind::Trajectory.word();
                     exchange.orders.command[1] = 99;
@@ -198,7 +198,7 @@ fn what_waits_is_refused_at_an_edge_in_motion() {
             line.parts(|parts| parts.input = true);
             line.tick(1);
             assert_ne!(stage(&mut client), Stage::Begun.word(), "{order:?} {engaged}");
-            assert!(!line.with(|rig| rig.exchange.waves()));
+            assert!(!line.with(|rig| rig.exchange.source.waves()));
             assert_ne!(kind(&line), CommandKind::Move.word());
         }
     }
@@ -239,7 +239,7 @@ fn what_waits_is_dropped_by_a_later_order_and_by_a_machine_that_stops() {
             done(&mut client, &order);
             dropper(&line, &mut client);
             // A wave that was ordered at once goes on; one that only waited is gone.
-            line.with(|rig| assert_eq!(rig.exchange.wave.is_some(), rig.exchange.waves(), "{number}"));
+            line.with(|rig| assert_eq!(rig.exchange.source.wave.is_some(), rig.exchange.source.waves(), "{number}"));
             assert_eq!(told(&line), (Stage::Dropped.word(), 0), "{number}");
             line.parts(|parts| parts.input = true);
             line.tick(2);

@@ -12,7 +12,7 @@ use crate::{Real, limits};
 /// ρ̂ of a leg, m/V; from `actuator`. X = q̂/ρ̂ is the virtual drive of (AII.1); mode P takes the leg as linear: u = q/ρ̂.
 pub const LEG_GAIN: Real = 6.31e-7;
 
-/// What `Config::new` holds.
+/// Values of `Config::new`.
 pub(crate) const DEFAULTS: Settings<Constants> = Settings {
     law: Law::Pcc,
     setpoint: SetpointKind::Pose,

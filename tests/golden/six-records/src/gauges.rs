@@ -18,5 +18,5 @@ pub const CONVERTER: GaugeConverter<Real> = GaugeConverter {
 /// Leg set-points outside this range are faults, m; from `actuator.stroke`.
 pub const LEG_SETPOINT: [Real; 2] = [-6e-5, 0.00012];
 
-/// Lowest and highest reading of each gauge that is believed, m; from `sensor.range`.
+/// Lowest and highest plausible reading of each gauge, m; from `sensor.range`.
 pub const RAW_LIMITS: [[Real; 2]; 6] = [[-2e-6, 4.8e-5]; 6];

@@ -29,8 +29,8 @@ pub const SPEC_DIGEST: &str = "3fd8f6b4af4ebd22388c3495efea949744bbcc53c4d69735a
 /// Version of the compiler.
 pub const SPECGEN_VERSION: &str = "0.1.0";
 
-/// What nobody measured: paths of the spec whose values are assumed, and simulated records. A program that drives a real machine
-/// asks its user first where this is not empty. Nothing of it is in the law.
+/// Unmeasured values: paths of the spec whose values are assumed, and simulated records. A program that drives
+/// a real machine asks its user first if the list is not empty. The law does not use it.
 pub const ASSUMED: &[&str] = &[
     "geometry.base_radius",
     "geometry.platform_radius",
@@ -49,5 +49,5 @@ pub const ASSUMED: &[&str] = &[
     "hysteresis: ../records/leg6.csv (simulated)",
 ];
 
-/// What this controller is, one `key=value` a line, lists separated by commas: for tools that load it at run time.
+/// Description of this controller: one `key=value` per line, lists separated by commas; for tools that load it.
 pub const DESCRIPTION: &str = "name=six-records\ndigest=3fd8f6b4af4ebd22388c3495efea949744bbcc53c4d69735afa7e87b35b0db3c\nversion=0.1.0\nkind=legs\nscalar_bits=32\nleg_gain=6.31e-7\nperiod=0.0002\ngrid=8\ndrive_range=0.0,100.0\nconfig_names=mode,setpoint_kind,level_weight,drift_weight,run_interval,max_step_codes,code_min,code_max\ninput_names=setpoint[0],setpoint[1],setpoint[2],setpoint[3],setpoint[4],setpoint[5],displacement[0],displacement[1],displacement[2],displacement[3],displacement[4],displacement[5]\noutput_names=voltage[0],voltage[1],voltage[2],voltage[3],voltage[4],voltage[5],requested[0],requested[1],requested[2],requested[3],requested[4],requested[5],demand[0],demand[1],demand[2],demand[3],demand[4],demand[5],level[0],level[1],level[2],level[3],level[4],level[5],drift[0],drift[1],drift[2],drift[3],drift[4],drift[5],dac_code[0],dac_code[1],dac_code[2],dac_code[3],dac_code[4],dac_code[5],status\n";

@@ -23,7 +23,7 @@ pub(crate) const NAMES: [&str; WORDS] = [
     "code_max",
 ];
 
-/// Ranges of the words of [`crate::CONFIG_NAMES`] in their order, both ends included, each for so many words; `code_min` is at
+/// Ranges of the words, in the order of [`crate::CONFIG_NAMES`], ends included, with their numbers of words; `code_min` is at
 /// most `code_max`.
 pub const SETTINGS: [(PermittedRange<Real>, usize); 6] = [
     (PermittedRange::Whole(0, 2), 1),

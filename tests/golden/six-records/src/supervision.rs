@@ -10,7 +10,7 @@ use crate::identity::Constants;
 use crate::hysteresis::Memory;
 use crate::{Real, limits};
 
-/// Bounds and times, these in ticks, or in samples of six ticks.
+/// Bounds and times. Times are in ticks, or in samples of six ticks.
 pub const SUPERVISION: Supervision<Real> = Supervision {
     arm_ticks: 500,
     rest: 0,
@@ -114,10 +114,10 @@ pub const READINGS_PER_LEG: [[Real; 6]; 6] = [
     [0.0, 0.0, 0.0, 0.0, 0.0, 1.0],
 ];
 
-/// What is left after a tick of the way to the set-point when the law begins; from `supervisor.arm_time`.
+/// Fraction of the distance to the set-point left after a tick, when the law starts; from `supervisor.arm_time`.
 pub const APPROACH_KEEP: Real = 0.998002;
 
-/// A way this short, m and rad, is none.
+/// Distance below which the set-point is reached, m and rad.
 pub const APPROACH_NEGLIGIBLE: Real = 1e-13;
 
 /// Reset: lowest voltage after a sweep to the highest and back, gauges zeroed there.

@@ -16,13 +16,13 @@ pub const NODES: usize = (GRID + 1) * (GRID + 2) / 2;
 /// Capacity of the reversal memory, extrema; from `hysteresis.memory`.
 pub const MEMORY: usize = 16;
 
-/// Whether legs are asked to be ahead, for their dead time.
+/// Whether the set-points of the legs lead, to compensate their dead time.
 pub const LED: bool = false;
 
-/// Lead of the leg displacements asked for, ticks; from `hysteresis.dead_time`.
+/// Lead of the leg set-points, ticks; from `hysteresis.dead_time`.
 pub const LEAD: Real = 0.0;
 
-/// Most that it adds to a demand, m; from `actuator.slew_rate`.
+/// Largest lead that is added to a demand, m; from `actuator.slew_rate`.
 pub const LEAD_LIMIT: Real = 0.0;
 
 /// Everett function of one leg.

@@ -19,7 +19,7 @@ pub fn emit(ir: &Ir) -> TokenStream {
         #converter
         /// Leg set-points outside this range are faults, m; from `actuator.stroke`.
         pub const LEG_SETPOINT: [Real; 2] = [#setpoint];
-        /// Lowest and highest reading of each gauge that is believed, m; from `sensor.range`.
+        /// Lowest and highest plausible reading of each gauge, m; from `sensor.range`.
         pub const RAW_LIMITS: [[Real; 2]; 6] = [[#gauge]; 6];
     }
 }

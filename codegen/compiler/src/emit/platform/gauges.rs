@@ -41,7 +41,7 @@ pub fn emit(ir: &Ir, s: &Sensing) -> TokenStream {
         pub const GAUGES: Gauges<'static, Real> = #gauges;
         /// Words in V to readings in m, lowest power first; from `gauge.calibration`. Without one a word is a reading.
         pub const CALIBRATION: Option<Meaning> = #calibration;
-        /// What the gauges' words mean, with so many coefficients each.
+        /// Conversion of the gauge words, with this number of coefficients each.
         pub type Meaning = Calibration<Real, #coefficients>;
         #[doc = #raw_doc]
         pub const RAW_LIMITS: [[Real; 2]; 6] = [#([#limits]),*];

@@ -60,15 +60,15 @@ pub fn emit(ir: &Ir, task: &TaskSpace) -> TokenStream {
         pub const AFFINE_LOAD: Option<Affine<Real>> = #load;
         /// Leg forces under which the gauges were zeroed: gravity at rest, N.
         pub const REST_FORCE: [Real; LEGS] = [#rest_force];
-        /// Largest |component| of the measured wrench that is believed, N and N m; from `control.interaction`.
+        /// Largest plausible |component| of the measured wrench, N and N m; from `control.interaction`.
         pub const WRENCH_LIMIT: [Real; 6] = [#wrench_limit];
         /// Lead of the leg displacements, in periods; from `control.lead`. Zero: none.
         pub const LEAD: Real = #lead;
-        /// Trajectories with a lead of their own: all or none; from `trajectory.lead`.
+        /// Number of trajectories with their own lead: all or none; from `trajectory.lead`.
         pub const LED: usize = #led;
         /// Lead of each, in periods.
         pub const OWN_LEADS: [Real; LED] = [#(#own_leads),*];
-        /// Part of the offset of a change of mode that is left after a tick; from `control.transfer_time`.
+        /// Fraction of the offset of a change of mode left after a tick; from `control.transfer_time`.
         pub const TRANSFER_KEEP: Real = #keep;
         /// Offset of a change of mode below which it is over, m.
         pub const TRANSFER_NEGLIGIBLE: Real = #negligible;
@@ -87,7 +87,7 @@ pub fn emit(ir: &Ir, task: &TaskSpace) -> TokenStream {
         pub const HANDS_OVER: bool = #hands_over;
         /// Axes with a correction of the request; from `control.correction`.
         pub const CORRECTED: usize = #corrected;
-        /// How far and how fast that of each goes.
+        /// Largest correction of each axis, and its largest rate.
         pub const CORRECTION: [CorrectionLimit<Real>; CORRECTED] = #correction;
     }
 }

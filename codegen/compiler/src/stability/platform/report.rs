@@ -31,7 +31,7 @@ pub fn describe(design: &Design) -> String {
     let _ = write!(text, "{}", gains("gains of P/F ewma, pcc", &design.combined));
     let _ = write!(text, "{}", gains("gains of P, P/F invhys", &design.position));
     if let Some(damping) = &design.damping {
-        text.push_str(&damped(design, damping));
+        text.push_str(&describe_damping(design, damping));
     }
     let touching = if design.touching { "free and touching the declared work piece" } else { "without contact" };
     let _ = writeln!(text, "  every control mode, checked {touching}:");
@@ -76,7 +76,8 @@ fn gains(name: &str, tuning: &Tuning) -> String {
 }
 
 /// Effect of active damping, mode by mode.
-fn damped(design: &Design, damping: &ActiveDamping) -> String {
+#[must_use]
+pub fn describe_damping(design: &Design, damping: &ActiveDamping) -> String {
     let lowest = design.modes[0].frequency / TAU;
     let mut text = format!(
         "  active damping in P/F:   peak of       |S|             |S| at {:.1}, {:.1}, {:.0} Hz\n    mode                 compliance   largest   worst            (without)\n",

@@ -110,7 +110,9 @@ pub struct StructuralChannel {
 }
 
 impl StructuralChannel {
-    pub(super) fn on_readings(&self) -> bool {
+    /// Whether it acts on what the gauges see, and not on the legs.
+    #[must_use]
+    pub fn on_readings(&self) -> bool {
         matches!(self.flexure, Flexure::Sensor(_))
     }
 

@@ -5,8 +5,8 @@ use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
+use super::super::contents::{MANIFEST, Manifest};
 use super::super::error::WriteError;
-use super::super::found::{MANIFEST, Manifest};
 use super::{Change, NEW, OLD, put_manifest, sync};
 
 /// Moves replaced and obsolete files into the work folder, and the new files from there into the output.

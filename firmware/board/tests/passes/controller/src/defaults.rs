@@ -13,7 +13,7 @@ use crate::{Real, limits};
 /// ρ̂ of a leg, m/V; from `actuator`. X = q̂/ρ̂ is the virtual drive of (AII.1); mode P takes the leg as linear: u = q/ρ̂.
 pub const LEG_GAIN: Real = 6.31e-7;
 
-/// What `Config::new` holds.
+/// Values of `Config::new`.
 pub(crate) const DEFAULTS: Settings<Constants> = Settings {
     mode: ControlMode::PF(Law::Pcc),
     interaction: Interaction::Neglected,
@@ -60,7 +60,7 @@ pub const LINES: usize = 1;
 /// Whether there is an input line; from `trigger`.
 pub const INPUT: bool = true;
 
-/// What each output shows.
+/// Source of each output.
 pub(crate) const TRIGGERS: [Line<Real>; LINES] = [
     Line {
         kind: specgen_runtime::trigger::Kind::Motion,

@@ -81,7 +81,7 @@ pub(crate) const NAMES: [&str; WORDS] = [
     "trigger_width[0]",
 ];
 
-/// Ranges of the words of [`crate::CONFIG_NAMES`] in their order, both ends included, each for so many words; `code_min` is at
+/// Ranges of the words, in the order of [`crate::CONFIG_NAMES`], ends included, with their numbers of words; `code_min` is at
 /// most `code_max`.
 pub const SETTINGS: [(PermittedRange<Real>, usize); 16] = [
     (PermittedRange::Whole(0, 6), 1),

@@ -179,19 +179,19 @@ pub const REST_FORCE: [Real; LEGS] = [
     3.3039389573761384,
 ];
 
-/// Largest |component| of the measured wrench that is believed, N and N m; from `control.interaction`.
+/// Largest plausible |component| of the measured wrench, N and N m; from `control.interaction`.
 pub const WRENCH_LIMIT: [Real; 6] = [3600.0, 3600.0, 3600.0, 360.0, 360.0, 360.0];
 
 /// Lead of the leg displacements, in periods; from `control.lead`. Zero: none.
 pub const LEAD: Real = 3.176570186778669;
 
-/// Trajectories with a lead of their own: all or none; from `trajectory.lead`.
+/// Number of trajectories with their own lead: all or none; from `trajectory.lead`.
 pub const LED: usize = 0;
 
 /// Lead of each, in periods.
 pub const OWN_LEADS: [Real; LED] = [];
 
-/// Part of the offset of a change of mode that is left after a tick; from `control.transfer_time`.
+/// Fraction of the offset of a change of mode left after a tick; from `control.transfer_time`.
 pub const TRANSFER_KEEP: Real = 0.9980019986673331;
 
 /// Offset of a change of mode below which it is over, m.
@@ -261,7 +261,7 @@ pub const HANDS_OVER: bool = false;
 /// Axes with a correction of the request; from `control.correction`.
 pub const CORRECTED: usize = 6;
 
-/// How far and how fast that of each goes.
+/// Largest correction of each axis, and its largest rate.
 pub const CORRECTION: [CorrectionLimit<Real>; CORRECTED] = [
     CorrectionLimit {
         most: 2e-6,
