@@ -3,7 +3,7 @@
 pub(super) use specgen_numerics::{Matrix6 as Matrix, cross, dot, norm};
 
 /// The inverse by Gauss-Jordan elimination with complete pivoting; none if a pivot vanishes.
-pub(crate) fn inverse(matrix: &Matrix) -> Option<Matrix> {
+pub(super) fn inverse(matrix: &Matrix) -> Option<Matrix> {
     let mut a = *matrix;
     let mut b = [[0.0; 6]; 6];
     for (k, row) in b.iter_mut().enumerate() {

@@ -226,7 +226,7 @@ pub fn closed_loop_of(model: &Model, task: &TaskSpace, plant: &RestDynamics) -> 
     // c_a = β k_a with β = 2 ζ/ω_1: damping grows with frequency.
     let damping = basis.frequencies.map(|frequency| task.modal_damping * frequency / basis.frequencies[0]);
     let period = model.timing.period;
-    let structure = structure::known(model, &basis, &plant.jacobian);
+    let structure = structure::known(model, task, &basis, &plant.jacobian);
     let notch = task.notch_damping.map(|ratio| Notch::of(&basis, &damping, ratio, period));
     Some(ClosedLoop {
         basis,

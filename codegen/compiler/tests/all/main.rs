@@ -8,6 +8,7 @@ mod design;
 mod golden;
 mod plant;
 mod simulation;
+mod structure;
 mod study;
 
 use std::f64::consts::TAU;
@@ -379,27 +380,5 @@ fn an_asymmetric_platform_is_designed_and_its_limit_holds_in_simulation() {
     for (part, expected) in [(0.95, true), (1.05, false)] {
         let run = run_of(&closed_loop, COMBINED, &along(part * g), &Conditions::NOMINAL);
         assert_eq!(settles(&run, &rest), expected, "limit {g}, × {part}");
-    }
-}
-
-#[test]
-fn zz_print_borders() {
-    let (mut model, mut task) = model();
-    task.notch_damping = Some(1.0);
-    if let Ok(x) = std::env::var("F0") { model.structure.from = Some(x.parse().unwrap()); }
-    for damped in [false, true] {
-        task.active_damping = damped;
-        let start = std::time::Instant::now();
-        let found = match design(&model, &task, &rest()) { Ok(f) => f, Err(e) => { eprintln!("REF {e:?}"); continue } };
-        eprintln!("damped {damped}: {:?}", start.elapsed());
-        if let Some(d) = &found.damping { for m in d.modes.iter().flatten() { eprintln!("MODE compl {:.3} S {:.2?} slow {:.3?} without {:.3?} tracking {:.3}", m.compliance, m.sensitivity, m.slow, m.without, m.tracking); } }
-        eprintln!("TUNING {:?}", found.combined);
-        for one in &found.margins { for b in &one.borders { eprintln!("B {} {} {:?}", one.law, b.kind, b.worst(found.structure_from)); } }
-        if damped {
-            task.design = found.stored.clone();
-            let start = std::time::Instant::now();
-            let again = design(&model, &task, &rest()).unwrap();
-            eprintln!("STORED {:?} {} same {}", start.elapsed(), again.searched, again.combined == found.combined && again.damping == found.damping && again.notch == found.notch);
-        }
     }
 }

@@ -16,8 +16,8 @@ mod driven;
 use super::law::Tuning;
 use super::modes::ModalBasis;
 use super::notch::{Biquad, Notch};
-use super::structure::StructuralChannel;
 use super::sampled::{PLACE, Plant, shown, states};
+use super::structure::StructuralChannel;
 use specgen_numerics::{Matrix, Matrix6, spectral_radius};
 use specgen_runtime::{ControlMode, Law};
 
@@ -405,7 +405,14 @@ impl<'a> Assembly<'a> {
     fn plant(&mut self, request: &[Signal; 6]) {
         let contact = self.of.contact(self.conditions.touching);
         let damping = self.of.damping.map(|ratio| ratio * self.conditions.damping);
-        let plant = Plant::new(&self.of.basis, &damping, self.conditions.stiffness, &contact, self.of.lags_used(), &self.of.structure);
+        let plant = Plant::new(
+            &self.of.basis,
+            &damping,
+            self.conditions.stiffness,
+            &contact,
+            self.of.lags_used(),
+            &self.of.structure,
+        );
         let whole = libm::floor(self.conditions.delay);
         let part = self.conditions.delay - whole;
         // Request of `age` ticks ago.

@@ -14,6 +14,8 @@
 //! met, the result is the best compromise, and the check of the whole loop decides.
 
 use core::f64::consts::PI;
+use std::collections::BTreeMap;
+use std::sync::{Mutex, PoisonError};
 
 use serde::Serialize;
 
@@ -186,9 +188,24 @@ const SECTION: [Scale; 6] = [
 /// Where a search starts: the start rule with a weak section.
 const START: [f64; 6] = [0.9, 0.02, 0.0, 0.06, 1.5, 0.3];
 
+/// Laws that this process has found, by digest: an editor compiles a spec after every key.
+static FOUND: Mutex<BTreeMap<String, DampedLaw>> = Mutex::new(BTreeMap::new());
+
 /// The law of a platform, from the start rule.
 pub(super) fn search(of: &ClosedLoop, adapting: Law, start: &Tuning, demand: &StructureDemand) -> DampedLaw {
-    let mut law = DampedLaw { sections: [Biquad { b: [0.0; 3], a: [0.0; 2] }; 6], notch_damping: [1.0; 6], tuning: *start };
+    let digest = digest(of, adapting, demand);
+    let known = || FOUND.lock().unwrap_or_else(PoisonError::into_inner);
+    if let Some(law) = known().get(&digest) {
+        return law.clone();
+    }
+    let law = searched(of, adapting, start, demand);
+    known().insert(digest, law.clone());
+    law
+}
+
+fn searched(of: &ClosedLoop, adapting: Law, start: &Tuning, demand: &StructureDemand) -> DampedLaw {
+    let mut law =
+        DampedLaw { sections: [Biquad { b: [0.0; 3], a: [0.0; 2] }; 6], notch_damping: [1.0; 6], tuning: *start };
     let groups = groups(of);
     // Of each group, the factors of k_p and k_I; and those of Ω1 and Ω2.
     let mut gains: [Option<[f64; 2]>; 6] = [None; 6];
@@ -218,13 +235,17 @@ pub(super) fn search(of: &ClosedLoop, adapting: Law, start: &Tuning, demand: &St
         let decode = |x: &[f64]| {
             let values: Vec<f64> = scales.iter().zip(x).map(|(scale, part)| scale.value(*part)).collect();
             let (own, section) = values.split_at(free);
-            let [k_p, k_i] = gains[group].unwrap_or([own.first().copied().unwrap_or(1.0), own.get(1).copied().unwrap_or(1.0)]);
+            let [k_p, k_i] =
+                gains[group].unwrap_or([own.first().copied().unwrap_or(1.0), own.get(1).copied().unwrap_or(1.0)]);
             let [level, drift] =
                 bandwidths.unwrap_or([own.get(2).copied().unwrap_or(1.0), own.get(3).copied().unwrap_or(1.0)]);
             ([k_p, k_i, level, drift], section.to_vec())
         };
-        let start_at: Vec<f64> =
-            scales.iter().zip([1.0].repeat(free).iter().chain(&START)).map(|(scale, value)| scale.part(*value)).collect();
+        let start_at: Vec<f64> = scales
+            .iter()
+            .zip([1.0].repeat(free).iter().chain(&START))
+            .map(|(scale, value)| scale.part(*value))
+            .collect();
         let cost = |x: &[f64]| {
             let (factors, section) = decode(x);
             let feedback = family.feedback(&scaled(start, factors));
@@ -263,7 +284,8 @@ pub(super) fn effect(of: &ClosedLoop, adapting: Law, start: &Tuning, law: &Dampe
         in_reach(of.basis.frequencies[mode], of.period).then(|| {
             let family = Family::of(of, mode, adapting, None);
             let rule = family.figures(&family.controller(&family.feedback(start), START[0], None));
-            let responses = family.with_section(&family.feedback(&law.tuning), law.notch_damping[mode], &law.sections[mode]);
+            let responses =
+                family.with_section(&family.feedback(&law.tuning), law.notch_damping[mode], &law.sections[mode]);
             let figures = family.figures(&responses);
             DampedMode {
                 compliance: figures.compliance,
@@ -275,6 +297,11 @@ pub(super) fn effect(of: &ClosedLoop, adapting: Law, start: &Tuning, law: &Dampe
         })
     });
     ActiveDamping { sections: law.sections, modes }
+}
+
+/// Target of the compliance peak of the mode at ω, relative to that without feedback.
+pub(super) fn target(of: &ClosedLoop, frequency: f64) -> f64 {
+    COMPLIANCE[usize::from(frequency > LOW * of.basis.frequencies[0])]
 }
 
 /// The notch of a law.
@@ -431,7 +458,8 @@ impl<'a> Family<'a> {
         }
         let suspects = demand.map_or_else(Vec::new, |demand| {
             let with = |channel: &super::StructuralChannel, plant: &Vec<Complex>| {
-                let factor = |angle: &f64| channel.flexure.factor(angle / period / channel.frequency, channel.damping_ratio);
+                let factor =
+                    |angle: &f64| channel.flexure.factor(angle / period / channel.frequency, channel.damping_ratio);
                 plant.iter().zip(&angles).map(|(p, angle)| times(*p, factor(angle))).collect()
             };
             demand.suspects.iter().flat_map(|one| corners.iter().map(move |plant| with(one, plant))).collect()
@@ -553,7 +581,8 @@ impl<'a> Family<'a> {
     /// Penalty for what a loop does not bear: a corner, or a structural mode of the range.
     fn unborne(&self, Controller { response, cancelled }: &Controller, range: Option<&FlexureRange>) -> f64 {
         let mut penalty = 0.0;
-        for plant in &self.corners {
+        let suspects = self.suspects.iter().map(|plant| (plant, None));
+        for (plant, range) in self.corners.iter().map(|plant| (plant, range)).chain(suspects) {
             let found = tolerance(plant, response, cancelled, &self.hertz, range);
             penalty += if found.stable { DEPTH * found.depth } else { UNSTABLE };
         }
@@ -612,7 +641,7 @@ impl<'a> Family<'a> {
             depth,
             // The open peak is 1/(2 ζ) of the static compliance, for small ζ.
             compliance: libm::sqrt(compliance) * 2.0 * self.damping * libm::sqrt(1.0 - self.damping * self.damping),
-            most_compliance: COMPLIANCE[usize::from(self.frequency > LOW * self.of.basis.frequencies[0])],
+            most_compliance: target(self.of, self.frequency),
             slow,
             tracking,
             noise: libm::sqrt(noise),

@@ -75,7 +75,8 @@ impl ClosedLoop {
     /// p of each mode at the angles ωT, with the amplifier's lag times `lag`: from a requested leg motion to the readings. Contact
     /// and λ are left out.
     pub(super) fn modal_responses(&self, conditions: &Conditions, lag: f64, angles: &[f64]) -> Vec<[Complex<f64>; 6]> {
-        let [shortest, gauge_lag] = ClosedLoop { lag: lag * self.lag, structure: Vec::new(), ..self.clone() }.lags_used();
+        let [shortest, gauge_lag] =
+            ClosedLoop { lag: lag * self.lag, structure: Vec::new(), ..self.clone() }.lags_used();
         let damping = self.damping.map(|ratio| ratio * conditions.damping);
         let plant = Plant::new(&self.basis, &damping, conditions.stiffness, &[[0.0; 6]; 6], [shortest, gauge_lag], &[]);
         let sampled = plant.sample(self.period);
@@ -126,8 +127,8 @@ pub(super) fn loci(matrix: &ComplexMatrix) -> [Complex<f64>; 6] {
         let mut next = 0;
         while let Some(&row) = block.get(next) {
             for column in 0..6 {
-                let coupled = matrix[(row, column)] != Complex::new(0.0, 0.0)
-                    || matrix[(column, row)] != Complex::new(0.0, 0.0);
+                let coupled =
+                    matrix[(row, column)] != Complex::new(0.0, 0.0) || matrix[(column, row)] != Complex::new(0.0, 0.0);
                 if coupled && !block.contains(&column) {
                     block.push(column);
                 }
@@ -143,9 +144,10 @@ pub(super) fn loci(matrix: &ComplexMatrix) -> [Complex<f64>; 6] {
                 let root = root(half * half - product);
                 vec![half + root, half - root]
             }
-            size => nalgebra::DMatrix::from_fn(size, size, at).schur().eigenvalues().map_or_else(Vec::new, |values| {
-                values.iter().copied().collect()
-            }),
+            size => nalgebra::DMatrix::from_fn(size, size, at)
+                .schur()
+                .eigenvalues()
+                .map_or_else(Vec::new, |values| values.iter().copied().collect()),
         };
         for (mode, value) in block.iter().zip(values) {
             found[*mode] = value;

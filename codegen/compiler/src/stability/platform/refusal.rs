@@ -8,7 +8,7 @@ use super::law::{LoopKind, Tuning};
 use super::margins::ModeMargins;
 use super::search::largest_stable;
 use super::structure::{Corners, MOST_DAMPING, StructureDemand};
-use super::{LARGEST_RADIUS, nominal_conditions, notch, worst_radius};
+use super::{LARGEST_RADIUS, damping, nominal_conditions, notch, worst_radius};
 use specgen_language::diagnostic::{Code, Diagnostic, codes};
 use specgen_language::model::{Model, TaskSpace};
 use specgen_runtime::{ControlMode, Law};
@@ -20,8 +20,8 @@ const SLACK: f64 = 0.95;
 /// Margins below these cause a warning.
 const THIN_GAIN: f64 = 1.5;
 const THIN_DELAY: f64 = 0.5;
-/// Above these, active damping is ineffective or too strong.
-const MOST_COMPLIANT: f64 = 0.67;
+/// Above these times its target of the compliance, and above this |S|, active damping is ineffective or too strong.
+const MOST_COMPLIANT: f64 = 1.3;
 const MOST_SENSITIVE: f64 = 2.2;
 
 /// A platform that [`super::ModalBasis`] refuses.
@@ -129,7 +129,8 @@ impl Case<'_> {
         if let Some((law, radius)) = worst.reduce(|worst, one| if one.1 > worst.1 { one } else { worst }) {
             return Some(Unstable { code: codes::UNSTABLE_PLATFORM, message: self.what(law, radius) });
         }
-        let borne = laws.iter().filter(|law| LoopKind::of(**law) != LoopKind::Open && !self.corners.bears(**law, tuning));
+        let borne =
+            laws.iter().filter(|law| LoopKind::of(**law) != LoopKind::Open && !self.corners.bears(**law, tuning));
         let demands = borne.filter_map(|law| self.corners.most_demanding(*law, tuning).map(|found| (*law, found)));
         let (law, (kind, [frequency, damping])) =
             demands.reduce(|worst, one| if one.1.1[1] > worst.1.1[1] { one } else { worst })?;
@@ -333,17 +334,20 @@ pub(super) fn thin(
 }
 
 /// Warns about modes that active damping does not improve, or leaves with a small margin.
-pub(super) fn hardly_damped(model: &Model, closed_loop: &ClosedLoop, damping: &ActiveDamping) -> Option<Diagnostic> {
+pub(super) fn hardly_damped(model: &Model, closed_loop: &ClosedLoop, found: &ActiveDamping) -> Option<Diagnostic> {
     let left: Vec<String> = closed_loop
         .basis
         .frequencies
         .iter()
-        .zip(&damping.modes)
+        .zip(&found.modes)
         .filter_map(|(frequency, mode)| {
             let hertz = frequency / TAU;
             match mode {
                 None => Some(format!("{hertz:.0} Hz (too fast for the period)")),
-                Some(mode) if mode.compliance > MOST_COMPLIANT || mode.sensitivity[1] > MOST_SENSITIVE => {
+                Some(mode)
+                    if mode.compliance > MOST_COMPLIANT * damping::target(closed_loop, *frequency)
+                        || mode.sensitivity[1] > MOST_SENSITIVE =>
+                {
                     Some(format!(
                         "{hertz:.0} Hz (compliance peak {:.2} times that without, largest sensitivity {:.2})",
                         mode.compliance, mode.sensitivity[1]

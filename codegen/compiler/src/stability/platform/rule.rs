@@ -7,9 +7,9 @@
 
 use super::closed_loop::{ClosedLoop, Conditions};
 use super::damping::{self, DampedLaw};
-use super::structure::{Corners, StructureDemand};
 use super::law::{LoopKind, Tuning};
 use super::search::largest_stable;
+use super::structure::{Corners, StructureDemand};
 use super::{LARGEST_RADIUS, nominal_conditions};
 use specgen_runtime::{ControlMode, Law};
 
@@ -60,10 +60,10 @@ pub(super) fn combined(
     let closed_loop = corners.closed_loop();
     let start = damped.copied().unwrap_or_else(|| start(closed_loop, limit));
     // A mode is fixed if the spec gives all that it uses.
-    let (fixed, free): (Vec<ControlMode>, Vec<_>) =
-        [LoopKind::Estimates, LoopKind::Combined].into_iter().flat_map(LoopKind::modes).partition(|mode| {
-            (given.gains.is_some() || !mode.feeds_back()) && given.bandwidths.is_some()
-        });
+    let (fixed, free): (Vec<ControlMode>, Vec<_>) = [LoopKind::Estimates, LoopKind::Combined]
+        .into_iter()
+        .flat_map(LoopKind::modes)
+        .partition(|mode| (given.gains.is_some() || !mode.feeds_back()) && given.bandwidths.is_some());
     if free.is_empty() {
         return given.over(&start);
     }

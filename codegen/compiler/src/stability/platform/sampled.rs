@@ -6,7 +6,7 @@
 //! d is the requested leg motion, z the pose, g its reading, all in modal coordinates. κ scales the axial stiffness of the legs at
 //! constant damping ratios, and K_e is the stiffness of a work piece that the platform touches. A structural mode adds an oscillator
 //! ẅ + 2 ζ_n ω_n ẇ + ω_n² w = ω_n² s, with s the drive p of its legs, which becomes w, or the reading z of its gauges, which becomes
-//! z + a (z − w − 2 ζ_n ẇ/ω_n).
+//! z − a (z − w − 2 ζ_n ẇ/ω_n).
 
 use super::modes::ModalBasis;
 use super::structure::StructuralChannel;

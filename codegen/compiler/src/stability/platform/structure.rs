@@ -2,7 +2,7 @@
 //!
 //! The border of stability of a mode in all six legs, or on all six readings, follows from the eigenvalues of the open loop
 //! ([`Flexure::border`]). A mode of one leg or one gauge closes a loop of one signal with all others closed: L/(1 + L) of that
-//! leg or gauge stands in its place. Where these curves do not enter the declared range of f_n and ζ, no single mode in it makes
+//! leg or gauge is then used instead. Where these curves do not enter the declared range of f_n and ζ, no single mode in it makes
 //! the loop unstable: a mode far above the loop has no effect, and poles move continuously.
 
 use core::f64::consts::{PI, TAU};
@@ -14,9 +14,9 @@ use super::closed_loop::{ClosedLoop, Conditions};
 use super::law::Tuning;
 use super::loop_gain::{ComplexMatrix, loci};
 use super::modes::ModalBasis;
-use specgen_language::model::{Model, StructuralKind, StructuralMode};
-use specgen_numerics::{Matrix, Matrix6, multiply6};
+use specgen_language::model::{Model, Probe, StructuralKind, StructuralMode, TaskSpace};
 use specgen_numerics::nyquist::{Flexure, FlexureRange};
+use specgen_numerics::{Matrix, Matrix6, cross, dot, multiply6};
 use specgen_runtime::ControlMode;
 
 /// Corners at which a loop must bear a mode, besides the nominal point: stiffness, relative lag of the amplifier, delay in ticks, each
@@ -78,22 +78,33 @@ impl StructureDemand {
     }
 }
 
-/// The `[[mode]]` of a spec, as parts of the plant; `jacobian`: ∂l/∂h. None of one gauge without gauges on the platform.
-pub(super) fn known(model: &Model, basis: &ModalBasis, jacobian: &Matrix6) -> Vec<StructuralChannel> {
-    let readings = crate::lower::readings_per_pose(model).ok().flatten();
+/// The `[[mode]]` of a spec, as parts of the plant; `jacobian`: ∂l/∂h.
+pub(super) fn known(model: &Model, task: &TaskSpace, basis: &ModalBasis, jacobian: &Matrix6) -> Vec<StructuralChannel> {
     let one = |mode: &StructuralMode| {
         let (flexure, per_pose) = match mode.kind {
-            StructuralKind::Leg => (Flexure::Series, Some(*jacobian)),
-            StructuralKind::Gauge | StructuralKind::Frame => (Flexure::Sensor(mode.participation), readings),
+            StructuralKind::Leg => (Flexure::Series, *jacobian),
+            _ => (Flexure::Sensor(mode.participation), task.probes.each_ref().map(|probe| reading(model, probe))),
         };
         let place = mode.place.and_then(|index| {
-            let per_mode = multiply6(&per_pose?, &basis.from_modal);
-            let modes = multiply6(&basis.to_modal, &crate::lower::inverse(&per_pose?)?);
-            Some((per_mode[index], modes.map(|row| row[index])))
+            let per_mode = multiply6(&per_pose, &basis.from_modal);
+            // No effect on any number of the controller: only stability is judged by it.
+            let inverse = nalgebra::Matrix6::from_fn(|i, j| per_mode[i][j]).try_inverse()?;
+            Some((per_mode[index], core::array::from_fn(|mode| inverse[(mode, index)])))
         });
         StructuralChannel { flexure, frequency: TAU * mode.frequency, damping_ratio: mode.damping_ratio, place }
     };
     model.structural_modes.iter().map(one).collect()
+}
+
+/// Reading of a gauge per pose coordinate at rest: its line meets the target plane at c, and with m the normal over its component along
+/// the line, it reads m·(v + ω × c).
+fn reading(model: &Model, probe: &Probe) -> [f64; 6] {
+    let m = probe.plane_normal.map(|part| part / dot(probe.plane_normal, probe.direction));
+    let start = [probe.point[0], probe.point[1], probe.point[2] - model.geometry.height];
+    let way = dot(m, core::array::from_fn(|k| probe.plane_point[k] - start[k]));
+    let c: [f64; 3] = core::array::from_fn(|k| start[k] + way * probe.direction[k]);
+    let turned = cross(c, m);
+    [m[0], m[1], m[2], turned[0], turned[1], turned[2]]
 }
 
 /// A structural mode of the plant, in modal coordinates.
@@ -140,8 +151,8 @@ impl StructuralChannel {
             }
             rates[(speed, place)] -= self.frequency;
             rates[(speed, speed)] -= 2.0 * self.damping_ratio * self.frequency;
-            // What the mode changes: w − s, or a (s − w − 2ζ ẇ/ω).
-            let share = if let Flexure::Sensor(share) = self.flexure { share } else { -1.0 };
+            // What the mode changes: w − s, or −a (s − w − 2ζ ẇ/ω), as r² H = −s²/(s² + 2ζωs + ω²).
+            let share = if let Flexure::Sensor(share) = self.flexure { -share } else { -1.0 };
             let mut change: Vec<f64> = source.iter().map(|value| share * value).collect();
             change[place] -= share;
             if self.on_readings() {
@@ -246,10 +257,15 @@ impl<'a> Corners<'a> {
     /// Whether a control mode is stable with every structural mode that it must bear, by the border of stability.
     pub(super) fn bears(&self, law: ControlMode, tuning: &Tuning) -> bool {
         let loci = self.loci(law, tuning);
-        self.demand.flexures.iter().all(|flexure| loci.demanded(*flexure, self.demand.from)[1] <= self.demand.damping_ratio)
-            && self.demand.suspects.iter().all(|one| {
-                self.border(&loci, one.flexure).at(one.frequency / TAU) < one.damping_ratio
-            })
+        self.demand
+            .flexures
+            .iter()
+            .all(|flexure| loci.demanded(*flexure, self.demand.from)[1] <= self.demand.damping_ratio)
+            && self
+                .demand
+                .suspects
+                .iter()
+                .all(|one| self.border(&loci, one.flexure).at(one.frequency / TAU) < one.damping_ratio)
     }
 
     /// The kind, frequency (Hz) and damping ratio of the mode that a control mode bears least, at a suspected mode or in the range.
@@ -259,7 +275,8 @@ impl<'a> Corners<'a> {
             let frequency = one.frequency / TAU;
             (kind_of(one.flexure), [frequency, self.border(&loci, one.flexure).at(frequency)])
         });
-        let ranges = self.demand.flexures.iter().map(|flexure| (kind_of(*flexure), loci.demanded(*flexure, self.demand.from)));
+        let ranges =
+            self.demand.flexures.iter().map(|flexure| (kind_of(*flexure), loci.demanded(*flexure, self.demand.from)));
         ranges.chain(suspects).reduce(|most, one| if one.1[1] > most.1[1] { one } else { most })
     }
 
@@ -311,11 +328,11 @@ impl Border {
         }
     }
 
-    /// ζ at a frequency, Hz, and about it.
+    /// ζ at a frequency, Hz, and about it; zero above the highest, which no tick sees.
     fn at(&self, frequency: f64) -> f64 {
-        let next = self.frequencies.iter().position(|one| *one > frequency).unwrap_or(self.frequencies.len());
-        let near = self.damping_ratios.get(next.saturating_sub(2)..(next + 1).min(self.damping_ratios.len()));
-        near.into_iter().flatten().fold(0.0, |most: f64, ratio| if *ratio > most { *ratio } else { most })
+        let Some(next) = self.frequencies.iter().position(|one| *one > frequency) else { return 0.0 };
+        let near = &self.damping_ratios[next.saturating_sub(2)..=next];
+        near.iter().fold(0.0, |most: f64, ratio| if *ratio > most { *ratio } else { most })
     }
 }
 
