@@ -1,4 +1,15 @@
 //! Bits of a tick's status.
+//!
+//! # Example
+//!
+//! ```
+//! use specgen_law::status::{GAUGE_FAULT, GENERATOR_BUSY, LEG_LIMITED};
+//!
+//! let status = 0x4_0201;
+//! assert_eq!(status & LEG_LIMITED, 1 << 0); // leg 0 is held back
+//! assert_eq!(status & GAUGE_FAULT, 1 << (8 + 1)); // gauge 1 is not trusted
+//! assert_ne!(status & GENERATOR_BUSY, 0); // a motion is under way
+//! ```
 
 /// Bits 0 to 5 of the status: leg held back by table, voltage or slew limit.
 pub const LEG_LIMITED: u32 = 0x3f;

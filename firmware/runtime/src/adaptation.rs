@@ -9,6 +9,24 @@
 //! ```
 //! ρ̂ X is the displacement requested after all limits: that is the anti-windup. The integrator form (AII.7)–(AII.13)
 //! belongs to another error (Y − Ŷ); it must not be fed with m.
+//!
+//! # Example
+//!
+//! A model error that drifts by 1 nm a run. At a weight of 1/2, EWMA is 2 nm behind the next run; φ̂ of PCC supplies
+//! them:
+//!
+//! ```
+//! use specgen_runtime::{Estimate, Law};
+//!
+//! let (mut ewma, mut pcc) = (Estimate::<f64>::new(), Estimate::<f64>::new());
+//! for run in 0..=60 {
+//!     ewma.update(Law::Ewma, 0.5, 0.0, f64::from(run));
+//!     pcc.update(Law::Pcc, 0.5, 0.5, f64::from(run));
+//! }
+//! // The error of run 61 will be 61 nm.
+//! assert!((ewma.correction() - 59.0).abs() < 1e-9);
+//! assert!((pcc.correction() - 61.0).abs() < 1e-9);
+//! ```
 
 use crate::choice::choice;
 use crate::real::Real;

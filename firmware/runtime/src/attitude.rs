@@ -5,6 +5,17 @@
 //!
 //! Everything is built from sin θ and 1 − cos θ, so that nothing cancels for small angles. The caller chooses how to
 //! compute them: [`Series`] is for angles within a declared bound.
+//!
+//! # Example
+//!
+//! A quarter turn about z has sine 1 and versine 1. R takes x to y, so R − I has −1 and 1 in its first column:
+//!
+//! ```
+//! use specgen_runtime::Attitude;
+//!
+//! let quarter = Attitude::<f64> { sine: [0.0, 0.0, 1.0], versine: [0.0, 0.0, 1.0] };
+//! assert_eq!(quarter.rotation_less_identity(), [[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [0.0, 0.0, 0.0]]);
+//! ```
 
 use crate::real::Real;
 

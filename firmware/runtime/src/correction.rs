@@ -7,6 +7,24 @@
 //! It is not a set-point: the error (7) is still that of h_d, and the innovation does not see it. A value that is not
 //! finite counts as zero. A value that is too large or too fast is followed up to the limits, so that the correction
 //! fades in and out without a bump.
+//!
+//! # Example
+//!
+//! A request of 10 nm at limits of 4 nm, and 3 nm a tick:
+//!
+//! ```
+//! use specgen_runtime::{Correction, CorrectionLimit, RequestCorrection};
+//!
+//! let limits = [CorrectionLimit { most: 4.0, step: 3.0 }; 6];
+//! let mut correction = Correction::<f64, 6>::new();
+//! assert!(correction.follow(&limits, &[10.0; 6])); // held back
+//! assert_eq!(correction.given, [3.0; 6]);
+//! assert!(correction.follow(&limits, &[10.0; 6]));
+//! assert_eq!(correction.given, [4.0; 6]);
+//! // Not a number counts as zero.
+//! correction.follow(&limits, &[f64::NAN; 6]);
+//! assert_eq!(correction.given, [1.0; 6]);
+//! ```
 
 use core::fmt::Debug;
 

@@ -2,6 +2,18 @@
 //!
 //! Finds every change of up to 32 neighbouring bits, and of one, two or three bits anywhere in a controller's tables.
 //! It works on half bytes with a table of 16 words: a controller checks a few kilobytes, once.
+//!
+//! # Example
+//!
+//! The check value of this checksum, that of the nine digits:
+//!
+//! ```
+//! use specgen_runtime::Crc32;
+//!
+//! let mut crc = Crc32::new();
+//! crc.bytes(b"123456789");
+//! assert_eq!(crc.finish(), 0xcbf4_3926);
+//! ```
 
 use crate::real::Real;
 

@@ -10,6 +10,26 @@
 //! through Γ⁻¹: f = (y − Σ w_j (1 − g_j) x_j)/(1 + Σ w_j g_j). One division, no iteration.
 //!
 //! Each state is a mean of past f with positive weights, so it stays within the range of the table at any demand.
+//!
+//! # Example
+//!
+//! With the table of [`crate::everett`] and one creep operator, g = 1/2 and w = 1/4: under a held drive the leg creeps
+//! from 6 µm towards 6 (1 + 1/4) = 7.5 µm, half of the rest in each tick.
+//!
+//! ```
+//! use specgen_runtime::{Creep, CreepEverett, CreepMemory, Everett};
+//!
+//! let still = Everett::<f64, 2, 6> { nodes: &[0.0, 2.0, 0.0, 6.0, 3.0, 0.0] };
+//! let creep = Creep { gains: [0.5], weights: [0.25], carried: [0.125], direct: 1.125 };
+//! let table = CreepEverett { still, creep: &creep };
+//! let mut leg = CreepMemory::<f64, 8, 1>::new();
+//! assert_eq!(leg.apply(&table, 2.0), 6.75); // 6 + 3/4
+//! assert_eq!(leg.apply(&table, 2.0), 7.125); // 6 + 4.5/4
+//! // To stay at 7.125 µm the drive has to fall.
+//! let drive = leg.solve(&table, 7.125);
+//! assert!(drive < 2.0);
+//! assert!((leg.apply(&table, drive) - 7.125).abs() < 1e-12);
+//! ```
 
 use crate::crc::Crc32;
 use crate::everett::Grid;

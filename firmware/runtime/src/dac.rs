@@ -2,6 +2,28 @@
 //!
 //! A voltage leaves the controller only as `volts_at_zero + code · volts_per_code` with `code_min ≤ code ≤ code_max`.
 //! So it is always finite and within limits.
+//!
+//! # Example
+//!
+//! A converter of 10 mV and a thousandth of a cell a code, with at most 100 codes a tick:
+//!
+//! ```
+//! use specgen_runtime::{CodeLimits, Dac};
+//!
+//! let dac = Dac::<f64> {
+//!     volts_at_zero: 0.0,
+//!     volts_per_code: 0.01,
+//!     cells_at_zero: 0.0,
+//!     cells_per_code: 0.001,
+//!     codes_per_cell: 1000.0,
+//! };
+//! let limits = CodeLimits { min: 0, max: 10_000, max_step: 100 };
+//! assert_eq!(dac.code(2.0004, 1990, limits), (2000, false));
+//! assert_eq!(dac.voltage(2000), 20.0);
+//! // The slew limit, and the highest code.
+//! assert_eq!(dac.code(2.0, 1000, limits), (1100, true));
+//! assert_eq!(dac.code(10.5, 9990, limits), (10_000, true));
+//! ```
 
 use crate::real::Real;
 

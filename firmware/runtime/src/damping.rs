@@ -6,6 +6,22 @@
 //! e is V⁻¹ (h_d − h), the raw pose error of a mode, before the notch. d is a displacement of the legs that is added to
 //! the feedback of (7), as V⁻¹J⁻¹ of it. Near the mode, D compensates the phase lag of amplifier and sampling, so that
 //! d opposes the velocity of the platform. As with k_v, the innovation does not see it.
+//!
+//! # Example
+//!
+//! The simplest D is a difference, 1 − z⁻¹: a request in proportion to the rate of the error, beside that of the
+//! feedback.
+//!
+//! ```
+//! use specgen_runtime::{Damping, ModalDamping, Resonator};
+//!
+//! let sections = [Resonator { b: [1.0, -1.0, 0.0], a: [0.0, 0.0] }; 6];
+//! let mut damping = Damping::<f64, 6>::new();
+//! damping.act(&sections, &[2.0; 6]);
+//! damping.act(&sections, &[5.0; 6]);
+//! assert_eq!(damping.asked, [3.0; 6]); // 5 − 2
+//! assert_eq!(damping.beside([10.0; 6]), [13.0; 6]);
+//! ```
 
 use core::fmt::Debug;
 

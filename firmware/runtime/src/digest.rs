@@ -1,4 +1,18 @@
 //! Fingerprint of a state: FNV-1a, word by word. It compares two runs; it does not protect against forgery.
+//!
+//! # Example
+//!
+//! ```
+//! use specgen_runtime::Digest;
+//!
+//! let of = |words: [u64; 2]| {
+//!     let mut digest = Digest::new();
+//!     words.map(|word| digest.word(word));
+//!     digest.finish()
+//! };
+//! assert_eq!(of([1, 2]), of([1, 2]));
+//! assert_ne!(of([1, 2]), of([2, 1])); // the order counts
+//! ```
 
 use crate::real::Real;
 

@@ -12,6 +12,26 @@
 //! - there is no root between the bounds, h is not monotone at the points tried, or the steps do not suffice;
 //! - the rate term takes away more than half of the gain of Γ₀ since the last tick. On a straight branch of slope f'
 //!   the inverse is u ← (q + Γ₁ u_last)/(f' + Γ₁). It diverges from tick to tick if Γ₁ < −f'/2.
+//!
+//! # Example
+//!
+//! Γ₀ is the table of [`crate::everett`], Γ₁ a tenth of it. In the tick in which the drive rises by 1 cell, the
+//! leg moves 2 + 1 × 0.2 µm; at rest, 2 µm:
+//!
+//! ```
+//! use specgen_runtime::{DynamicEverett, DynamicMemory, Everett};
+//!
+//! let still = Everett::<f64, 2, 6> { nodes: &[0.0, 2.0, 0.0, 6.0, 3.0, 0.0] };
+//! let rate = Everett::<f64, 2, 6> { nodes: &[0.0, 0.2, 0.0, 0.6, 0.3, 0.0] };
+//! let table = DynamicEverett { still, rate, tolerance: 1e-5 };
+//! let mut leg = DynamicMemory::<f64, 8>::new();
+//! assert_eq!(leg.apply(&table, 1.0), 2.2);
+//! assert_eq!(leg.apply(&table, 1.0), 2.0);
+//! // At rest 4.4 µm need 1.6 cells; on the way there, less: 1 + v with (2 + 4 v) + v (0.2 + 0.4 v) = 4.4.
+//! let drive = leg.solve(&table, 4.4);
+//! assert!(!leg.fell_back() && (drive - 1.543).abs() < 1e-3);
+//! assert!((leg.apply(&table, drive) - 4.4).abs() < 1e-5);
+//! ```
 
 use crate::everett::Grid;
 use crate::memory::ReversalMemory;

@@ -9,6 +9,25 @@
 //!
 //! [`Grid`] has the algorithms. A table written by the compiler is an [`Everett`], whose size is part of its type; a
 //! table read at run time is [`Nodes`]. Equal numbers give equal bits in both.
+//!
+//! # Example
+//!
+//! A table of two cells, in µm. Rising from 0, the leg moves 2 µm in the first cell and 4 µm in the second; rising from
+//! a reversal at 1 cell, only 3 µm:
+//!
+//! ```
+//! use specgen_runtime::{Everett, Grid};
+//!
+//! //             E(0, 0)  E(1, 0) E(1, 1)  E(2, 0) E(2, 1) E(2, 2)
+//! let nodes = &[0.0,     2.0, 0.0,        6.0, 3.0, 0.0];
+//! let table = Everett::<f64, 2, 6> { nodes };
+//! assert_eq!(table.value(1.5, 0.0), 4.0); // 2 + 4/2
+//! assert_eq!(table.value(1.5, 1.0), 1.5); // 3/2
+//! // The inverse: from 0, a displacement of 4 µm needs 1.5 cells.
+//! assert_eq!(table.rise(0.0, 0.0, 4.0).0, 1.5);
+//! // From full drive, a fall to 1 cell takes 3 µm away.
+//! assert_eq!(table.fall(2.0, 2.0, 3.0).0, 1.0);
+//! ```
 
 use crate::field::Field;
 use crate::real::{Real, saturate};

@@ -1,6 +1,22 @@
 //! Feedback of (7): k_p e + k_I ∫e, as a generalised force on the platform, with anti-windup.
 //!
 //! The integral is stored as the force it exerts (N, N m), not as ∫e, so that a change of gain is bumpless.
+//!
+//! # Example
+//!
+//! An error of 2 µm along x for one tick of 0.5 s, with k_I = 8 N/(µm s), adds 8 N. A leg at its upper limit stops an
+//! integral that would push it further, but not one that leads back:
+//!
+//! ```
+//! use specgen_runtime::feedback::{Integral, winds_up};
+//!
+//! let mut integral = Integral::<f64>::new();
+//! integral.grow(&Integral::growth(&[8.0; 6], 0.5, &[2.0, 0.0, 0.0, 0.0, 0.0, 0.0]));
+//! assert_eq!(integral.force[0], 8.0);
+//! let at_limit = [1e-6, 0.0, 0.0, 0.0, 0.0, 0.0];
+//! assert!(winds_up(&at_limit, &[1e-9; 6]));
+//! assert!(!winds_up(&at_limit, &[-1e-9; 6]));
+//! ```
 
 use crate::real::{Real, saturate};
 use crate::snapshot::LARGEST;

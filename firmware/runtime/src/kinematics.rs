@@ -7,6 +7,29 @@
 //! Δl   = u (1 − τ/2 + τ²/2 − 5/8 τ³ + …)     u = s/(2 l₀), τ = u/l₀
 //! h ← h + J⁻¹ (Δl − Δl(h)),  J = ∂l/∂h at rest      forward kinematics, a fixed number of times
 //! ```
+//!
+//! # Example
+//!
+//! Six vertical legs of 40 mm. A rise of 10 mm makes each 10 mm longer, and so does a shift of 30 mm, because 30, 40
+//! and 50 mm are the sides of a right triangle:
+//!
+//! ```
+//! use specgen_runtime::{Legs, Series};
+//!
+//! let legs = Legs::<f64> {
+//!     rest_leg: [[0.0, 0.0, 0.04]; 6],
+//!     platform_joint: [[0.1, 0.0, 0.0]; 6],
+//!     rest_length: [0.04; 6],
+//!     series: Series { sine: &[-1.0 / 6.0, 1.0 / 120.0], versine: &[1.0 / 2.0, -1.0 / 24.0] },
+//!     root: &[],
+//!     newton_steps: 5,
+//! };
+//! for pose in [[0.0, 0.0, 0.01, 0.0, 0.0, 0.0], [0.03, 0.0, 0.0, 0.0, 0.0, 0.0]] {
+//!     assert!((legs.displacements(&pose)[0] - 0.01).abs() < 1e-12);
+//! }
+//! // A tilt by −1 mrad about y lifts the joint at x = 100 mm by 0.1 mm.
+//! assert!((legs.displacements(&[0.0, 0.0, 0.0, 0.0, -1e-3, 0.0])[0] - 1e-4).abs() < 1e-9);
+//! ```
 
 use crate::attitude::Series;
 use crate::linear::{difference, each, transform};

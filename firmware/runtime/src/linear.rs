@@ -1,4 +1,16 @@
 //! Six-vectors and the constant maps between them.
+//!
+//! # Example
+//!
+//! ```
+//! use specgen_runtime::linear::{difference, is_within, transform};
+//!
+//! let mut swap = [[0.0; 6]; 6];
+//! (swap[0][1], swap[1][0]) = (2.0, 1.0);
+//! assert_eq!(transform(&swap, &[3.0, 5.0, 0.0, 0.0, 0.0, 0.0])[..2], [10.0, 3.0]);
+//! assert_eq!(difference(&[3.0; 6], &[1.0; 6]), [2.0; 6]);
+//! assert!(is_within(&[1.0; 6], &[1.0; 6]) && !is_within(&[f64::NAN; 6], &[1.0; 6]));
+//! ```
 
 use crate::real::Real;
 

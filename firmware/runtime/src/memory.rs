@@ -11,6 +11,27 @@
 //! Within a cell of the table a branch is a straight line ([`Line`]), which inverse and forward model share.
 //!
 //! The table sets the number of stored extrema ([`Grid::capacity`]): all that fit, or fewer at run time.
+//!
+//! # Example
+//!
+//! With the table of [`crate::everett`]: a drive of 1 cell gives 2 µm on the way up and 3 µm on the way down.
+//!
+//! ```
+//! use specgen_runtime::{Everett, ReversalMemory};
+//!
+//! let table = Everett::<f64, 2, 6> { nodes: &[0.0, 2.0, 0.0, 6.0, 3.0, 0.0] };
+//! let mut leg = ReversalMemory::<f64, 8>::new();
+//! assert_eq!(leg.apply(&table, 1.0), 2.0);
+//! assert_eq!(leg.apply(&table, 2.0), 6.0);
+//! assert_eq!(leg.apply(&table, 1.0), 3.0); // 6 − E(2, 1)
+//! // Γ⁻¹ on the rise from this reversal: 3 + 3 (x − 1) = 4.5
+//! assert_eq!(leg.solve(&table, 4.5), 1.5);
+//! assert_eq!(leg.apply(&table, 1.5), 4.5);
+//! assert_eq!(leg.depth(), 3); // negative saturation, the maximum at 2, the minimum at 1
+//! // The minor loop closes where it began, and is wiped out.
+//! assert_eq!(leg.apply(&table, 2.0), 6.0);
+//! assert_eq!(leg.depth(), 1);
+//! ```
 
 use crate::everett::{Grid, LastLine, Line};
 use crate::real::{Real, saturate};

@@ -1,4 +1,16 @@
 //! Active parts of the control law.
+//!
+//! # Example
+//!
+//! ```
+//! use specgen_runtime::{ControlMode, Law};
+//!
+//! let mode = ControlMode::from_word(6);
+//! assert_eq!(mode, Some(ControlMode::PF(Law::Pcc)));
+//! // Without estimates, P/F has the gains of P.
+//! assert!(ControlMode::PF(Law::Invhys).own_gains() && !ControlMode::PF(Law::Pcc).own_gains());
+//! assert!(!ControlMode::F(Law::Pcc).feeds_back());
+//! ```
 
 use core::fmt;
 

@@ -7,6 +7,23 @@
 //! ```
 //! It removes the resonance from the feedback, so that integral action and adaptation may be fast. Slow signals pass
 //! unchanged (DC gain 1). It filters the feedback only, never the set-point. It does not damp the platform.
+//!
+//! # Example
+//!
+//! A section with g = 1/2 and a₁ = a₂ = 0 is H(z) = (1 + z⁻²)/2. It removes a mode at a quarter of the tick rate and
+//! passes what is slow:
+//!
+//! ```
+//! use specgen_runtime::{NotchState, Section};
+//!
+//! let sections = [Section { depth: 0.5, a: [0.0, 0.0] }; 6];
+//! let mut ringing = NotchState::<f64>::new();
+//! let out = [1.0, 0.0, -1.0, 0.0, 1.0].map(|value| ringing.filter(&sections, &[value; 6])[0]);
+//! assert_eq!(out, [0.5, 0.0, 0.0, 0.0, 0.0]);
+//! let mut still = NotchState::<f64>::new();
+//! let out = [1.0, 1.0, 1.0, 1.0].map(|value| still.filter(&sections, &[value; 6])[0]);
+//! assert_eq!(out, [0.5, 0.5, 1.0, 1.0]);
+//! ```
 
 use crate::real::Real;
 

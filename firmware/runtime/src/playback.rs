@@ -6,6 +6,20 @@
 //! n counts ticks, D is the number of ticks from knot to knot, a_k a knot: six whole numbers of pm and prad. Before the first and behind the
 //! last knot c is 0, so that it fades in and out. B is not negative and sums to 1: |c| is nowhere above the largest |a_k|, and its change in a
 //! tick nowhere above the largest |a_k − a_{k−1}|/D.
+//!
+//! # Example
+//!
+//! One knot of 600 pm along x, D = 4 ticks: B is 4/6 at the knot and 1/6 at the next.
+//!
+//! ```
+//! use specgen_runtime::playback::at;
+//!
+//! let knots = [[600, 0, 0, 0, 0, 0]];
+//! let x = [0, 4, 8].map(|tick| at::<f64>(&knots, 4, tick)[0]);
+//! assert!((x[0] - 400e-12).abs() < 1e-24);
+//! assert!((x[1] - 100e-12).abs() < 1e-24);
+//! assert_eq!(x[2], 0.0);
+//! ```
 
 use crate::real::Real;
 

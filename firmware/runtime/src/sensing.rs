@@ -22,6 +22,30 @@
 //! A gauge along an axis of the base, or normal to its plane, has zeros among its constants. Their terms are left out,
 //! so that constants known to the compiler cost nothing: an axis-aligned layout takes less than half the time of a skew
 //! one.
+//!
+//! # Example
+//!
+//! A gauge that looks along z at x = 80 mm (here six times) reads a rise as is, and a tilt θ about y as −80 mm tan θ:
+//!
+//! ```
+//! use specgen_runtime::{Gauges, Series};
+//!
+//! let gauges = Gauges::<f64> {
+//!     direction: [[0.0, 0.0, 1.0]; 6],
+//!     normal: [[0.0, 0.0, 1.0]; 6],
+//!     skew: [[0.0; 3]; 6],
+//!     pierced: [[0.08, 0.0, 0.0]; 6],
+//!     inverse: [[0.0; 6]; 6], // needed only for the pose
+//!     curvature: [[0.0; 6]; 6],
+//!     passes: 1,
+//!     arc_sine: &[],
+//!     arc_tangent: &[],
+//! };
+//! let series = Series { sine: &[-1.0 / 6.0, 1.0 / 120.0], versine: &[1.0 / 2.0, -1.0 / 24.0] };
+//! let read = |pose| gauges.readings(&series, &pose)[0];
+//! assert_eq!(read([0.0, 0.0, 5e-6, 0.0, 0.0, 0.0]), 5e-6);
+//! assert!((read([0.0, 0.0, 0.0, 0.0, 1e-3, 0.0]) + 0.08 * 1e-3_f64.tan()).abs() < 1e-15);
+//! ```
 
 use crate::attitude::{Series, horner, odd_series};
 use crate::linear::each;

@@ -1,4 +1,21 @@
 //! Bumpless change of mode: the difference between the new law's request and the legs' position is faded out.
+//!
+//! # Example
+//!
+//! An offset of 8 nm that halves in each tick, until no more than 1 nm would be left:
+//!
+//! ```
+//! use specgen_runtime::Transfer;
+//!
+//! let mut transfer = Transfer::<f64>::new();
+//! transfer.begin([8.0; 6]);
+//! let left = [(); 3].map(|()| {
+//!     transfer.fade(0.5, 1.0);
+//!     transfer.offset()[0]
+//! });
+//! assert_eq!(left, [4.0, 2.0, 0.0]);
+//! assert!(!transfer.is_active());
+//! ```
 
 use crate::real::Real;
 

@@ -2,6 +2,20 @@
 //!
 //! The kernels are those of fdlibm (f64) and Cephes (f32) for |angle| ≤ π/4. Larger angles are fractions of a turn in
 //! fixed point, whose reduction is exact.
+//!
+//! # Example
+//!
+//! An eighth and a quarter of a turn, and a third of a half turn:
+//!
+//! ```
+//! use specgen_runtime::trig::{sine_cosine, sine_cosine_turns};
+//!
+//! let (sine, cosine) = sine_cosine_turns::<f64>(1 << 61);
+//! assert!((sine - 0.5_f64.sqrt()).abs() < 1e-15 && (cosine - 0.5_f64.sqrt()).abs() < 1e-15);
+//! assert_eq!(sine_cosine_turns::<f64>(1 << 62), (1.0, 0.0));
+//! let (sine, _) = sine_cosine(core::f64::consts::FRAC_PI_6);
+//! assert!((sine - 0.5_f64).abs() < 1e-15);
+//! ```
 
 use crate::real::Real;
 

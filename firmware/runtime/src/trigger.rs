@@ -375,6 +375,12 @@ impl<T: Real + Debug, const N: usize> OutputLines<T> for Triggers<T, N> {
 }
 
 /// The lines that are high in a status: bit k for line k.
+///
+/// ```
+/// use specgen_runtime::trigger::{HIGH, lines};
+///
+/// assert_eq!(lines(HIGH[0] | HIGH[3]), 0b1001);
+/// ```
 #[inline]
 #[must_use]
 pub const fn lines(status: u32) -> u32 {

@@ -7,6 +7,22 @@
 //! α makes the low-pass the exact sampled form of 1/(1 + s/ω_c). A ramp gives its slope once the initial transient has
 //! decayed (e^{−ω_c t}). A slow sine gives its derivative with a delay of T/2 + (1 − α) T/α ≈ 1/ω_c. White noise of σ
 //! on the pose becomes σ (α/T) √(2/(2 − α)) on the rate.
+//!
+//! # Example
+//!
+//! A ramp of 1 µm a tick, with T = 1 tick and α = 1/2. The first pose gives no rate; then the rest of the way halves:
+//!
+//! ```
+//! use specgen_runtime::{Rate, RateFilter};
+//!
+//! let filter = RateFilter { keep: 0.5, gain: 0.5 };
+//! let mut rate = Rate::<f64>::new();
+//! let found = [10.0, 11.0, 12.0, 13.0].map(|pose| {
+//!     rate.update(&filter, &[pose; 6]);
+//!     rate.value()[0]
+//! });
+//! assert_eq!(found, [0.0, 0.5, 0.75, 0.875]);
+//! ```
 
 use crate::real::Real;
 

@@ -5,7 +5,7 @@ use std::sync::OnceLock;
 
 use host_sim::platform::rig::{Bench as Rig, Request};
 use host_sim::platform::{Specimen, WorkPart};
-use host_sim::trajectory::PoseTarget;
+use host_sim::trajectory::{PaperPath, PaperPose, PoseTarget};
 use specgen::stability::platform::{ClosedLoop, Conditions, Tuning};
 use specgen::tuning::relay;
 use specgen_runtime::{ControlMode, Law};
@@ -37,7 +37,8 @@ fn every_mode_is_damped_within_the_bounds_of_the_design() {
         for step in (0..=20).step_by(length(5, 1)) {
             let stiffness = 0.6 + 0.05 * f64::from(step);
             let conditions = Conditions { stiffness, ..Conditions::NOMINAL };
-            let radius = closed_loop.spectral_radius(ControlMode::PF(adapting), &design.combined, &conditions);
+            let mode = ControlMode::PF(adapting);
+            let radius = closed_loop.spectral_radius(mode, design.tuning(mode), &conditions);
             assert!(radius < 1.0, "stiffness x {stiffness}: {radius}");
         }
     }
@@ -110,6 +111,27 @@ fn damped_machines_follow_and_hold_better_than_undamped_ones() {
         let [(before, [ring, place, turn]), (after, [rung, placed, turned])] = found[..] else { unreachable!() };
         assert!(after[0] <= *bar && after[0] < before[0], "{after:?}");
         assert!(rung <= 10.0 && rung < ring && placed <= place && turned <= turn, "{found:?}");
+    }
+}
+
+/// In contact and without estimates, only the integral corrects the unknown force. P/F with Invhys has the same as P, and a
+/// feed-forward besides.
+#[test]
+fn without_estimates_feed_forward_halves_the_error_of_p_on_glass() {
+    let other = [(); 2].map(|()| OnceLock::<Bench>::new());
+    let mut benches = vec![("plays", reference_machine()), ("plays, damped", damped_machine())];
+    if length(false, true) {
+        benches.push(("Bouc-Wen", other[0].get_or_init(|| bouc_wen("glass-bouc-wen", &[]))));
+        benches.push(("Bouc-Wen, damped", other[1].get_or_init(|| bouc_wen("glass-damped-bouc-wen", &[DAMPED]))));
+    }
+    let path = PaperPose::corrected(PaperPath::Machining, 1.0);
+    let modes = [ControlMode::WORDS[0], ControlMode::WORDS[4]];
+    for (name, bench) in benches {
+        let glass = [("glass", WorkPart::glass())];
+        let table = bench.scenario().machining(&mut bench.controller(), &modes, &glass, &path).unwrap();
+        let [p, both] = [0, 1].map(|row| table.rows[row].translation_nm);
+        println!("{name}, glass: P {p:.1} nm, P/F with Invhys {both:.1} nm");
+        assert!(both <= 0.6 * p, "{name}: {both} nm, P {p} nm");
     }
 }
 

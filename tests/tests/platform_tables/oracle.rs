@@ -177,8 +177,8 @@ fn a_setting_off_by_a_hundredth_is_seen() {
     for (mode, setting) in [
         (0, "position_ki[2]"),
         (0, "position_kp[5]"),
-        (4, "ki[0]"),
-        (4, "kp[3]"),
+        (4, "position_ki[0]"),
+        (4, "position_kp[3]"),
         (6, "level_weight"),
         (6, "drift_weight"),
     ]

@@ -8,6 +8,7 @@
 //! Pose coordinates are x, y, z (m) and θx, θy, θz (rad) from rest. Not modelled: flexure stiffness, bending of legs, axial modes
 //! inside a leg, hysteresis (represented by λ), dynamics of the gauges beyond a first-order lag.
 
+mod channel;
 mod closed_loop;
 mod damping;
 mod law;
@@ -32,6 +33,7 @@ use specgen_language::model::{Gains, Interaction, Model, StoredDesign, TaskSpace
 use specgen_numerics::{Matrix6, jacobian, mass_matrix};
 
 pub use super::LARGEST_RADIUS;
+pub use channel::StructuralChannel;
 pub use closed_loop::{ClosedLoop, Conditions};
 pub use damping::{ActiveDamping, DampedLaw, DampedMode, SLOW};
 pub use law::{LoopKind, Tuning, start_law, start_mode};
@@ -40,7 +42,7 @@ pub use modes::ModalBasis;
 pub use notch::{Biquad, Notch};
 pub use report::{describe, describe_damping};
 pub use rule::bandwidth_limit;
-pub use structure::{Border, StructuralChannel, StructureDemand};
+pub use structure::{Border, Corners, StructureDemand};
 
 /// Number of λ values checked, evenly spaced over the interval, ends included.
 const RATIOS: u32 = 5;
@@ -141,15 +143,15 @@ pub fn design(model: &Model, task: &TaskSpace, plant: &RestDynamics) -> Result<D
         searched = stored.is_none();
         rule::damped(&mut closed_loop, limit, adapting, stored.map(DampedLaw::from), &demand)
     });
-    let closed_loop = closed_loop;
-    let corners = structure::Corners::of(&closed_loop, &demand);
+    let corners = Corners::of(closed_loop, demand);
+    let (closed_loop, demand) = (corners.closed_loop(), corners.demand());
     let start = damping.as_ref().map(|(_, law)| &law.tuning);
     let combined = rule::combined(&corners, limit, given, start, ratios);
     let position = task.position_gains.as_ref().map_or_else(|| rule::alone(&corners, limit, ratios), gains);
     refusal::check(model, task, &corners, &combined, &position)?;
     let effect = damping.as_ref().map(|(start, law)| {
         let law = DampedLaw { tuning: combined, ..law.clone() };
-        damping::effect(&closed_loop, adapting, start, &law)
+        damping::effect(closed_loop, adapting, start, &law)
     });
     let margins: Vec<ModeMargins> = ControlMode::all()
         .map(|law| {
@@ -157,9 +159,9 @@ pub fn design(model: &Model, task: &TaskSpace, plant: &RestDynamics) -> Result<D
             ModeMargins::of(&corners, law, tuning, ratios)
         })
         .collect();
-    let mut findings = refusal::thin(model, task, &closed_loop, &margins);
+    let mut findings = refusal::thin(model, task, closed_loop, &margins);
     findings.extend(task.design.as_ref().filter(|_| stored.is_none()).map(|_| refusal::stale(model)));
-    findings.extend(effect.as_ref().and_then(|damping| refusal::hardly_damped(model, &closed_loop, damping)));
+    findings.extend(effect.as_ref().and_then(|damping| refusal::hardly_damped(model, closed_loop, damping)));
     let basis = &closed_loop.basis;
     Ok(Design {
         modes: core::array::from_fn(|i| Mode {
@@ -215,7 +217,11 @@ impl Design {
     #[must_use]
     pub fn closed_loop(&self, model: &Model, task: &TaskSpace, plant: &RestDynamics) -> Option<ClosedLoop> {
         let active_damping = self.damping.as_ref().map(|damping| damping.sections);
-        closed_loop_of(model, task, plant).map(|closed_loop| ClosedLoop { active_damping, ..closed_loop })
+        closed_loop_of(model, task, plant).map(|closed_loop| ClosedLoop {
+            active_damping,
+            notch: self.notch.clone(),
+            ..closed_loop
+        })
     }
 }
 
@@ -226,7 +232,7 @@ pub fn closed_loop_of(model: &Model, task: &TaskSpace, plant: &RestDynamics) -> 
     // c_a = β k_a with β = 2 ζ/ω_1: damping grows with frequency.
     let damping = basis.frequencies.map(|frequency| task.modal_damping * frequency / basis.frequencies[0]);
     let period = model.timing.period;
-    let structure = structure::known(model, task, &basis, &plant.jacobian);
+    let structure = channel::known(model, task, &basis, &plant.jacobian);
     let notch = task.notch_damping.map(|ratio| Notch::of(&basis, &damping, ratio, period));
     Some(ClosedLoop {
         basis,

@@ -18,8 +18,7 @@ fn designed(edit: impl Fn(&mut Model, &mut TaskSpace)) -> Result<(Design, Closed
     task.notch_damping = Some(1.0);
     edit(&mut model, &mut task);
     let found = design(&model, &task, &rest())?;
-    let mut closed_loop = found.closed_loop(&model, &task, &rest()).unwrap();
-    closed_loop.notch.clone_from(&found.notch);
+    let closed_loop = found.closed_loop(&model, &task, &rest()).unwrap();
     Ok((found, closed_loop))
 }
 

@@ -3,7 +3,7 @@
 use specgen_compiler::compile::Compilation;
 use specgen_compiler::lower::platform;
 use specgen_compiler::stability::platform::{
-    ClosedLoop, Conditions, LARGEST_RADIUS, LoopKind, RestDynamics, Tuning, start_mode,
+    ClosedLoop, Conditions, Corners, LARGEST_RADIUS, LoopKind, RestDynamics, StructureDemand, Tuning, start_mode,
 };
 use specgen_compiler::stability::{LegDynamics, ewma_limit, pcc_limit, spectral_radius};
 use specgen_language::model::{Adaptation, AdaptationMode};
@@ -40,6 +40,8 @@ pub enum Feasibility {
     Platform {
         /// The closed loop without the tuned settings.
         closed_loop: Box<ClosedLoop>,
+        /// The same with every structural mode that it must bear.
+        corners: Box<Corners>,
         /// Control modes that use the tuned parameters.
         laws: Vec<ControlMode>,
         /// λ.
@@ -68,7 +70,15 @@ impl Feasibility {
         let kinds: &[LoopKind] =
             if own.own_gains() { &[LoopKind::Position] } else { &[LoopKind::Estimates, LoopKind::Combined] };
         laws.extend(kinds.iter().copied().flat_map(LoopKind::modes).filter(|law| *law != own));
-        Self::Platform { closed_loop: Box::new(closed_loop), laws, ratios: model.adaptation.gain_ratio, required }
+        let demand = StructureDemand::of(model, &closed_loop.basis);
+        let corners = Box::new(Corners::of(closed_loop.clone(), demand));
+        Self::Platform {
+            closed_loop: Box::new(closed_loop),
+            corners,
+            laws,
+            ratios: model.adaptation.gain_ratio,
+            required,
+        }
     }
 
     /// Whether `setting` is stable with the margins.
@@ -78,11 +88,10 @@ impl Feasibility {
             (Self::Legs { dynamics, adaptation, required }, Setting::Legs { level, drift }) => {
                 leg_holds(dynamics, adaptation, required, *level, *drift)
             }
-            (Self::Platform { closed_loop, laws, ratios, required }, Setting::Platform { period, .. }) => {
-                laws.iter().all(|law| {
-                    let tuning = setting.tuning(law.own_gains());
-                    platform_holds(closed_loop, *law, &tuning, *ratios, required, *period)
-                })
+            (Self::Platform { closed_loop, corners, laws, ratios, required }, Setting::Platform { period, .. }) => {
+                let tuning = |law: &ControlMode| setting.tuning(law.own_gains());
+                laws.iter().all(|law| platform_holds(closed_loop, *law, &tuning(law), *ratios, required, *period))
+                    && laws.iter().all(|law| corners.bears(*law, &tuning(law)))
             }
             _ => false,
         }

@@ -4,8 +4,8 @@
 //! two elite strings are kept unchanged; crossover makes its fraction of the other children, mutation the rest.
 
 use rand_chacha::ChaCha8Rng;
-use specgen_numerics::unit_interval as unit;
 use rand_chacha::rand_core::{Rng, SeedableRng};
+use specgen_numerics::unit_interval as unit;
 
 use super::search::Optimiser;
 

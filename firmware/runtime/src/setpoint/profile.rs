@@ -11,6 +11,19 @@
 //! ```
 //! The least n, m and L, in this order, that keep every axis within its limits are found by an integer search, without
 //! a square root: see [`Profile::plan`].
+//!
+//! # Example
+//!
+//! A move of 1 mm with at most 10 µm a tick, 1 µm a tick² and 0.5 µm a tick³: n = 2 ticks of jerk reach the full
+//! acceleration, m = 10 ticks the full speed, L = 100 ticks at full speed cover the distance. It takes L + m + n ticks.
+//!
+//! ```
+//! use specgen_runtime::setpoint::{MoveLimits, Profile};
+//!
+//! let limits = MoveLimits::<f64> { speed: [1e5; 6], acceleration: [1e6; 6], jerk: [2e6; 6] };
+//! let profile = Profile::plan(&[1e-3, 0.0, 0.0, 0.0, 0.0, 0.0], &limits);
+//! assert_eq!(profile.map(|profile| profile.ticks()), Some(112));
+//! ```
 
 use crate::real::Real;
 

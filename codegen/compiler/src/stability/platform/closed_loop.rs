@@ -13,11 +13,11 @@
 
 mod driven;
 
+use super::channel::StructuralChannel;
 use super::law::Tuning;
 use super::modes::ModalBasis;
 use super::notch::{Biquad, Notch};
 use super::sampled::{PLACE, Plant, shown, states};
-use super::structure::StructuralChannel;
 use specgen_numerics::{Matrix, Matrix6, spectral_radius};
 use specgen_runtime::{ControlMode, Law};
 

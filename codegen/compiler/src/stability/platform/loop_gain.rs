@@ -10,15 +10,13 @@ use core::f64::consts::TAU;
 
 use nalgebra::Complex;
 
+use super::channel::ComplexMatrix;
 use super::closed_loop::{ClosedLoop, Conditions};
 use super::law::Tuning;
 use super::notch::Biquad;
 use super::sampled::{PLACE, Plant, shown};
 use specgen_numerics::Matrix6;
 use specgen_runtime::{ControlMode, Law};
-
-/// A 6×6 matrix of complex numbers.
-pub(super) type ComplexMatrix = nalgebra::Matrix6<Complex<f64>>;
 
 fn complex(matrix: &Matrix6, factor: Complex<f64>) -> ComplexMatrix {
     ComplexMatrix::from_fn(|i, j| factor * matrix[i][j])

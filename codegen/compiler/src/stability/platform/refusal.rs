@@ -116,7 +116,7 @@ struct Unstable {
 
 struct Case<'a> {
     model: &'a Model,
-    corners: &'a Corners<'a>,
+    corners: &'a Corners,
     closed_loop: &'a ClosedLoop,
     conditions: &'a [Conditions],
 }

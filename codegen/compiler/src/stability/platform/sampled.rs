@@ -8,8 +8,8 @@
 //! ẅ + 2 ζ_n ω_n ẇ + ω_n² w = ω_n² s, with s the drive p of its legs, which becomes w, or the reading z of its gauges, which becomes
 //! z − a (z − w − 2 ζ_n ẇ/ω_n).
 
+use super::channel::StructuralChannel;
 use super::modes::ModalBasis;
-use super::structure::StructuralChannel;
 use specgen_numerics::{Matrix, Matrix6, exponential};
 
 /// First state of each group of six: lagged drive, displacement, velocity over ω, and reading.
