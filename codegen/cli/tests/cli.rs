@@ -8,13 +8,14 @@ use std::os::unix::fs::{PermissionsExt, symlink};
 
 use crate::support::{Document, Folder, Run};
 
-const COMMANDS: [&str; 20] = [
+const COMMANDS: [&str; 21] = [
     "check",
     "build",
     "size",
     "flash",
     "sim",
     "tune",
+    "design",
     "robust",
     "report",
     "reproduce",
@@ -48,7 +49,7 @@ fn arguments_that_make_no_sense_are_usage_errors() {
         (&["chek"], "did you mean `specgen check`?"),
         (
             &["frobnicate", "legs.toml"],
-            "new, check, explain, build, size, flash, sim, tune, learn, robust, report, reproduce, pil, operate, panel, gcs, replay, dynamics, export, identify, forc, plant, doctor, lsp, dump-ir, cache, completions",
+            "new, check, explain, build, size, flash, sim, tune, design, learn, robust, report, reproduce, pil, operate, panel, gcs, replay, dynamics, export, identify, forc, plant, doctor, lsp, dump-ir, cache, completions",
         ),
         (&["check"], "<SPEC>"),
         (&["explain", "w0441"], "did you mean E0441, workspace bound that no pose reaches?"),

@@ -28,6 +28,7 @@ const LINES: &[(&str, &[(&str, &str)])] = &[
     ("specgen flash", &[("file", "legs.toml"), ("target", "stm32h743")]),
     ("specgen sim", &[("spec", "legs.toml")]),
     ("specgen tune", &[("spec", "legs.toml")]),
+    ("specgen design", &[("spec", "reference.toml")]),
     ("specgen learn", &[("spec", "learning.toml")]),
     ("specgen robust", &[("spec", "legs.toml")]),
     ("specgen robust merge", &[("parts", "any.json")]),

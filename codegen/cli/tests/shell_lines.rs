@@ -16,6 +16,7 @@ use scan::{PROGRAMS, built, code, is_sentence, lines, literals, sources};
 
 /// Places where commands are built, and the test that runs them.
 const BUILT: &[(&str, usize, &str)] = &[
+    ("codegen/studies/src/design.rs", 1, "next_commands_name_the_files_that_were_named"),
     ("codegen/studies/src/build.rs", 3, "next_commands_name_the_files_that_were_named"),
     ("codegen/studies/src/check.rs", 2, "next_commands_name_the_files_that_were_named"),
     ("codegen/studies/src/firmware/flash.rs", 1, "a_line_for_a_programmer_names_the_image"),
@@ -252,6 +253,10 @@ fn next_commands_name_the_files_that_were_named() {
         assert_eq!(code, 0, "{text}");
         called(&text, &[&spec], 1);
         let (code, text) = run(&folder, &["--no-build", "-o", "out"], &spec, &[]);
+        assert_eq!(code, 0, "{text}");
+        called(&text, &[&spec], 1);
+        fs::copy(folder.path("reference.toml"), folder.path(&spec)).unwrap();
+        let (code, text) = run(&folder, &["design"], &spec, &[]);
         assert_eq!(code, 0, "{text}");
         called(&text, &[&spec], 1);
         let (_, text) = run(&folder, &["new", "--like", "reference"], &format!("{name}/bench"), &[]);

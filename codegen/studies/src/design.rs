@@ -79,7 +79,7 @@ impl Outcome for DesignReport<'_> {
         let Self { name, written, design, next } = self;
         let Some(damping) = &design.damping else {
             let what = if *written { "removed the stored design" } else { "nothing to store" };
-            return format!("{name}: no active damping, {what}: the compiler derives the gains\nnext: {next}\n");
+            return format!("{name}: no active damping, {what}: the compiler derives the gains\n  next     {next}\n");
         };
         let what = if *written { "wrote [control.design]" } else { "the stored design belongs to this spec" };
         let mut text = format!(
@@ -88,7 +88,7 @@ impl Outcome for DesignReport<'_> {
             describe_damping(design, damping)
         );
         // Writing to a String cannot fail.
-        let _ = writeln!(text, "next: {next}");
+        let _ = writeln!(text, "  next     {next}");
         text
     }
 }

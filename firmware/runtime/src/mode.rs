@@ -47,7 +47,7 @@ impl ControlMode {
     #[inline]
     #[must_use]
     pub const fn own_gains(self) -> bool {
-        self.feeds_back() && matches!(self.law(), Law::Invhys)
+        matches!(self, Self::P | Self::PF(Law::Invhys))
     }
 
     /// Whether the legs go through the inverse Preisach model; if not, they are taken as linear.

@@ -18,7 +18,7 @@ use specgen_runtime::playback::{self, Knot};
 use super::convergence::{Learnable, spacing};
 use super::matrix::{Matrix6c, inverse, multiply};
 use super::motion::Motion;
-use super::passes::{LearnError, RepeatableMachine, followed, unlimited};
+use super::passes::{LearnError, ONSET, RepeatableMachine, followed, unlimited};
 use super::response::{Bin, Response};
 use super::table::knots;
 use super::update::{kept, mapped};
@@ -44,8 +44,6 @@ const WITHIN: f64 = 0.5;
 const SLOW: [f64; 2] = [100.0, 10.0];
 /// Frequency above which the sweep is limited by the rate of a correction and falls in inverse proportion, Hz.
 const FAST: f64 = 1280.0;
-/// Shortest time in which a correction may rise from zero to its limit, s.
-pub(super) const ONSET: f64 = 1e-3;
 /// Fade-in and fade-out time of a sweep, s.
 const FADE: f64 = 5e-3;
 /// Width of a bin, Hz, and its minimum relative to the frequency: half of the narrowest resonance that feedback leaves on usual platforms.

@@ -13,7 +13,6 @@ use specgen_runtime::pass::{Course, Player};
 use specgen_runtime::playback::{self, Knot, UNIT};
 
 use super::coherence::Coherence;
-use super::excitation::ONSET;
 use super::gain::{Judge, Score, Verdict};
 use super::motion::Motion;
 use super::observation::PassObservation;
@@ -21,6 +20,8 @@ use super::plan::Plan;
 use super::table::knots;
 use super::update::Update;
 
+/// Shortest time in which a correction may rise from zero to its limit, s.
+pub(super) const ONSET: f64 = 1e-3;
 /// Status bits for refused or stale set-points: the motion was not made.
 const NOT_FOLLOWED: u32 = 0x3_0000;
 /// Status bits for implausible gauges.
