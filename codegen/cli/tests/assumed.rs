@@ -10,7 +10,7 @@ use specgen::spec::{self, SpecSource};
 use specgen::target;
 
 /// Assumed in specs/reference.toml, all gauges as one.
-const OF_REFERENCE: usize = 13;
+const OF_REFERENCE: usize = 14;
 const MARK: &str = "# simulated by specgen: no leg was measured\n";
 
 /// The whole list of a spec, its brackets included.
@@ -120,7 +120,7 @@ fn each_entry_is_the_path_of_a_value_that_the_spec_has_once() {
 fn the_verdict_counts_them() {
     let folder = Folder::new();
     let summary = format!("  assumed  {OF_REFERENCE} values, simulated leg record\n");
-    let headline = format!("reference is good so far on {OF_REFERENCE} assumed values: 7 limits kept, 3 warnings\n");
+    let headline = format!("reference is good so far on {OF_REFERENCE} assumed values: 8 limits kept, 3 warnings\n");
     for arguments in [&["check", "reference.toml"][..], &["reference.toml", "-o", "out", "--no-build"]] {
         let run = folder.run(arguments);
         assert!(run.code == 0 && run.stdout.starts_with(&headline) && run.stdout.contains(&summary), "{run:#?}");
@@ -139,9 +139,10 @@ fn the_verdict_counts_them() {
     // All measured, with a record of a leg: the verdict is unchanged.
     let record = folder.read("records/reference-forc.csv");
     folder.write("records/reference-forc.csv", record.replacen(MARK, "", 1));
-    folder.write("own.toml", with_list(&folder, "reference.toml", ""));
+    let structure = "\n[robust.structure]\nf0 = \"900 Hz\"\n";
+    folder.write("own.toml", with_list(&folder, "reference.toml", "") + structure);
     let run = folder.run(&["check", "own.toml"]);
-    assert!(run.stdout.starts_with("reference is good so far: 7 limits kept, 3 warnings\n"), "{}", run.stdout);
+    assert!(run.stdout.starts_with("reference is good so far: 8 limits kept, 3 warnings\n"), "{}", run.stdout);
     assert!(!run.stdout.contains("assumed"), "{}", run.stdout);
 }
 
@@ -198,7 +199,7 @@ fn a_real_board_takes_assumptions_only_if_they_are_accepted() {
     let flash = ["flash", "reference.toml", "--target", "stm32h743", "--yes", "-o", "out"];
     let words = [
         "E0348",
-        "13 assumed values, simulated leg record",
+        "14 assumed values, simulated leg record",
         "amplifier.lag",
         "records/reference-forc.csv (simulated)",
         "--assumed-ok",
@@ -210,7 +211,9 @@ fn a_real_board_takes_assumptions_only_if_they_are_accepted() {
         assert!(!folder.path("out").exists());
     }
     // Also for the spec's own part; a list, or only a simulated record, is enough.
-    let board = |text: String| text.replace("mcu = \"mps2-an500\"", "mcu = \"stm32h743zi\"");
+    let board = |text: String| {
+        text.replace("mcu = \"mps2-an500\"", "mcu = \"stm32h743zi\"") + "\n[robust.structure]\nf0 = \"900 Hz\"\n"
+    };
     folder.write("own.toml", board(with_list(&folder, "reference.toml", "assumed = [\"sensor.noise\"]\n")));
     folder.run(&["build", "own.toml", "-o", "out"]).says(1, &["E0348", "1 assumed value, simulated leg record"]);
     let record = folder.read("records/reference-forc.csv");
@@ -272,14 +275,16 @@ fn a_new_spec_names_what_nobody_gave() {
             );
         }
         let spec = format!("{like}/platform.toml");
-        let line = format!("\n  assumed  {} values, simulated leg record\n", assumed.len());
+        // A platform's range of structural modes, which the spec leaves out, counts as well.
+        let counted = assumed.len() + gauges;
+        let line = format!("\n  assumed  {counted} values, simulated leg record\n");
         let check = folder.run(&["check", &spec]);
         assert!(check.code == 0 && check.stdout.contains(&line), "{check:#?}");
         // One is measured.
         folder
             .write(&spec, text.replacen("\"actuator.resonance\", ", "", 1).replacen("\"actuator.resonance\",", "", 1));
         let check = folder.run(&["check", &spec]).stdout;
-        assert!(check.contains(&format!("\n  assumed  {} values, simulated", assumed.len() - 1)), "{check}");
+        assert!(check.contains(&format!("\n  assumed  {} values, simulated", counted - 1)), "{check}");
     }
 }
 

@@ -150,7 +150,7 @@ fn the_main_job_answers_in_ten_lines() {
         (
             "reference.toml",
             0,
-            ["reference is ready on 13 assumed values: ", "agree in every bit over 20,000 ticks", "≤ 4,500"],
+            ["reference is ready on 14 assumed values: ", "agree in every bit over 20,000 ticks", "≤ 4,500"],
         ),
         ("small.toml", 1, ["legs is NOT ready: instructions 2,", "> 300", "  next     specgen size small.toml"]),
     ];

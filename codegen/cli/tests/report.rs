@@ -153,7 +153,7 @@ fn the_report_of_a_platform_judges_errors_by_their_limits() {
     );
     in_order(
         &page,
-        &["13 assumed values, simulated leg record", "noise at rest in θ", "E0347", "<table>", "not measured: 13"],
+        &["14 assumed values, simulated leg record", "noise at rest in θ", "E0347", "<table>", "not measured: 14"],
     );
     let table = page.split("<caption>Errors on trajectories, rms</caption>").nth(1).unwrap();
     for (name, word) in [

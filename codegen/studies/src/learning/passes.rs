@@ -93,7 +93,9 @@ impl<'a> Learner<'a> {
     /// Begins to learn, from two passes under the same correction.
     fn session(self, equal: [&PassObservation; 2], motion: &Motion) -> Session<'a> {
         match self {
-            Self::Host(update) => Session::Host(update, update.coherence(equal.map(|seen| errors(seen, motion)))),
+            Self::Host(update) => {
+                Session::Host(update, Box::new(update.coherence(equal.map(|seen| errors(seen, motion)))))
+            }
             Self::Device(plan) => Session::Device(plan),
         }
     }
@@ -101,7 +103,7 @@ impl<'a> Learner<'a> {
 
 /// A learner with what it knows of the noise.
 enum Session<'a> {
-    Host(&'a Update, Coherence),
+    Host(&'a Update, Box<Coherence>),
     Device(&'a Plan),
 }
 

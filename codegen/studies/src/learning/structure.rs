@@ -22,6 +22,9 @@ use super::convergence::Learnable;
 use super::matrix::{Matrix6c, inverse, multiply};
 use super::response::Bin;
 
+/// What a fit leaves in one direction: frequency, Hz, relative residual, weight.
+type Direction = Vec<(f64, Complex, f64)>;
+
 /// Number of parameters of the platform: W, D, λ, dead time and lag; index of the first of each.
 const PLATFORM: usize = 50;
 const DAMPING: usize = 36;
@@ -599,7 +602,7 @@ impl Problem {
     }
 
     /// For each direction (legs, gauges, all), what the fit leaves there at each frequency, relative, with its weight.
-    fn directions(&self, fit: &Fit) -> Vec<(Place, Vec<(f64, Complex, f64)>)> {
+    fn directions(&self, fit: &Fit) -> Vec<(Place, Direction)> {
         let places: Vec<Place> = (0..6).map(Place::Leg).chain((0..6).map(Place::Gauge)).chain([Place::Legs]).collect();
         let mut all: Vec<_> = places.into_iter().map(|place| (place, Vec::with_capacity(self.points.len()))).collect();
         for point in &self.points {

@@ -77,6 +77,9 @@ fn margins(compiled: &Compilation) -> Vec<Figure> {
             || Figure::more_than(subject, "delay", LOOKED_AT[1], "ticks"),
             |ticks| Figure::new(subject, "delay", ticks, "ticks"),
         ));
+        let needed = design.margins.iter().map(|mode| mode.structure_damping).fold(0.0, f64::max);
+        let structure = Figure::new(subject, "structure ζ", 100.0 * needed, "%");
+        figures.push(structure.at_most(100.0 * compiled.model.structure.damping_ratio, "robust.structure"));
         return figures;
     }
     let Some(margins) = &compiled.margins else { return Vec::new() };

@@ -39,15 +39,15 @@ const LOW: f64 = 1.3;
 /// Frequencies at which |S| of slow motion is compared with that of the start rule: the lowest mode over these.
 pub const SLOW: [f64; 3] = [36.0, 7.2, 3.6];
 /// Target of |S| at the first of them, relative to the start rule.
-const SLOWEST: f64 = 1.4;
+const SLOWEST: f64 = 1.15;
 /// Target of |C| above this share of half the tick rate: what it amplifies of the gauge noise.
 const FAST: f64 = 1.0;
 const FAST_FROM: f64 = 0.4;
 /// Weights of tracking and of compliance.
 const TRACKING: f64 = 8.0;
-const STIFF: f64 = 1.0;
+const STIFF: f64 = 2.0;
 /// Share of the error power of a path with corners that rings at the modes, under the start rule; the rest is slow.
-const RINGING: f64 = 0.46;
+const RINGING: f64 = 0.25;
 /// Penalties for an unstable corner, and for the depth of a border in the range of structural modes.
 const UNSTABLE: f64 = 1000.0;
 const DEPTH: f64 = 20.0;

@@ -40,6 +40,8 @@ pub struct ModeMargins {
     pub settling: Option<f64>,
     /// Oscillating closed-loop modes with damping below 0.5, by frequency.
     pub modes: Vec<ClosedMode>,
+    /// Damping ratio that a structural mode of the declared range needs at most.
+    pub structure_damping: f64,
     /// For each kind of structural mode, the smallest damping ratio that it must have.
     pub borders: Vec<Border>,
 }
@@ -102,6 +104,7 @@ impl ModeMargins {
             delay_margin: delay_margin_ticks.map(|ticks| ticks * closed_loop.period),
             settling,
             modes,
+            structure_damping: corners.needed(&loci),
             borders: corners.demand().flexures.iter().map(|flexure| corners.border(&loci, *flexure)).collect(),
         }
     }

@@ -5,7 +5,10 @@ use std::fmt::Write as _;
 
 use super::Design;
 use super::damping::{ActiveDamping, DampedMode, SLOW};
-use super::law::Tuning;
+use super::law::{LoopKind, Tuning};
+
+/// Frequencies at which the border of structural modes is listed, over the lowest of the declared range.
+const MULTIPLES: [f64; 5] = [1.0, 1.5, 2.0, 3.0, 4.0];
 
 /// A few lines: modes, gains, and a table of margins.
 #[must_use]
@@ -56,6 +59,33 @@ pub fn describe(design: &Design) -> String {
             or(one.settling.map(|time| time * 1e3), "-", 1),
             least
         );
+    }
+    text.push_str(&structure(design));
+    text
+}
+
+/// For each control mode and kind of structural mode: the smallest ζ with which the loop is stable.
+fn structure(design: &Design) -> String {
+    let from = design.structure_from;
+    let shown = |ratio: f64| if ratio > 0.0 { format!("{ratio:.4}") } else { "any".to_owned() };
+    let mut text = format!(
+        "  smallest damping ratio of a structural mode with which the loop is stable, at, Hz:\n  {:<12}{:<7}",
+        "mode", "kind"
+    );
+    let frequencies = MULTIPLES.map(|multiple| multiple * from);
+    for frequency in frequencies {
+        let _ = write!(text, "{frequency:>9.0}");
+    }
+    let _ = writeln!(text, "{:>22}", format!("most from {from:.0} Hz on"));
+    for one in design.margins.iter().filter(|one| LoopKind::of(one.law) != LoopKind::Open) {
+        for border in &one.borders {
+            let _ = write!(text, "  {:<12}{:<7}", one.law.to_string(), border.kind);
+            for frequency in frequencies {
+                let _ = write!(text, "{:>9}", shown(border.at(frequency)));
+            }
+            let worst = border.worst(from).map_or("any".to_owned(), |[at, ratio]| format!("{ratio:.4} at {at:.0} Hz"));
+            let _ = writeln!(text, "{worst:>22}");
+        }
     }
     text
 }

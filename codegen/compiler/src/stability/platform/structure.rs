@@ -90,11 +90,13 @@ pub struct Border {
 }
 
 impl Border {
-    /// The frequency from `from` (Hz) on that demands the most damping, and that ζ; none if every damping is enough.
+    /// The frequency from `from` (Hz) on, or in the interval about it, that demands the most damping, and that ζ; none if every damping
+    /// is enough.
     #[must_use]
     pub fn worst(&self, from: f64) -> Option<[f64; 2]> {
-        let both = self.frequencies.iter().zip(&self.damping_ratios);
-        both.filter(|(frequency, ratio)| **frequency >= from && **ratio > 0.0)
+        let first = self.frequencies.iter().rposition(|frequency| *frequency <= from).unwrap_or(0);
+        let both = self.frequencies.iter().zip(&self.damping_ratios).skip(first);
+        both.filter(|(_, ratio)| **ratio > 0.0)
             .max_by(|a, b| a.1.total_cmp(b.1))
             .map(|(frequency, ratio)| [*frequency, *ratio])
     }
@@ -154,17 +156,23 @@ impl Corners {
         Loci(found)
     }
 
+    /// The damping ratio that a mode of the range needs at most.
+    pub(super) fn needed(&self, loci: &Loci) -> f64 {
+        let range = [self.demand.from, 0.5 / self.of.period];
+        let needs = self.demand.flexures.iter().map(|flexure| loci.demanded(*flexure, range)[1]);
+        needs.fold(0.0, |most, one| if one > most { one } else { most })
+    }
+
     /// Whether a control mode is stable with every structural mode that it must bear, by the border of stability.
     #[must_use]
     pub fn bears(&self, law: ControlMode, tuning: &Tuning) -> bool {
         let loci = self.loci(law, tuning);
-        self.demand.flexures.iter().all(|flexure| {
-            loci.demanded(*flexure, [self.demand.from, 0.5 / self.of.period])[1] <= self.demand.damping_ratio
-        }) && self
-            .demand
-            .suspects
-            .iter()
-            .all(|one| self.border(&loci, one.flexure).at(one.frequency / TAU) < one.damping_ratio)
+        self.needed(&loci) <= self.demand.damping_ratio
+            && self
+                .demand
+                .suspects
+                .iter()
+                .all(|one| self.border(&loci, one.flexure).at(one.frequency / TAU) < one.damping_ratio)
     }
 
     /// The kind, frequency (Hz) and damping ratio of the mode that a control mode bears least, at a suspected mode or in the range.
@@ -231,7 +239,7 @@ impl Border {
     }
 
     /// ζ at a frequency, Hz, and about it; zero above the highest, which no tick sees.
-    fn at(&self, frequency: f64) -> f64 {
+    pub(super) fn at(&self, frequency: f64) -> f64 {
         let Some(next) = self.frequencies.iter().position(|one| *one > frequency) else { return 0.0 };
         let near = &self.damping_ratios[next.saturating_sub(2)..=next];
         near.iter().fold(0.0, |most: f64, ratio| if *ratio > most { *ratio } else { most })

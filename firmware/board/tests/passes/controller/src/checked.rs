@@ -9,7 +9,7 @@ use specgen_runtime::Crc32;
 use crate::{CONFIG_WORDS, hysteresis, setpoint};
 
 /// CRC-32 (ISO-HDLC) of [`IDENTITY`], the tables, the trajectories and [`SETTINGS`]; computed by specgen.
-pub const CRC: u32 = 0xb5902926;
+pub const CRC: u32 = 0xd6004098;
 
 /// The spec's settings, in the order of [`crate::CONFIG_NAMES`]: the value of `Config::new().to_words()`.
 pub static SETTINGS: [u64; CONFIG_WORDS] = [
@@ -27,7 +27,7 @@ pub static SETTINGS: [u64; CONFIG_WORDS] = [
 
 /// Origin of this controller, in one line, and its unmeasured values, in a second. It is part of every image
 /// whose target calls [`intact`](crate::integrity::intact). `specgen size` prints it; `specgen flash` asks about line 2.
-pub static IDENTITY: [u8; 440] = *b"specgen-identity: specgen 0.1.0, platform reference, f64, spec 65342534b55bae75fe24a93ba57b063f4bfa443b1e1869c3661b53a2f25cf88d\nassumed: geometry.base_radius, geometry.platform_radius, geometry.height, leg.fixed_center, leg.extensible_center, actuator.axial_stiffness, actuator.resonance, actuator.damping_ratio, amplifier.lag, amplifier.noise, sensor.range, gauge, control.modal_damping, hysteresis: records/reference-forc.csv (simulated)\n";
+pub static IDENTITY: [u8; 458] = *b"specgen-identity: specgen 0.1.0, platform reference, f64, spec 65342534b55bae75fe24a93ba57b063f4bfa443b1e1869c3661b53a2f25cf88d\nassumed: geometry.base_radius, geometry.platform_radius, geometry.height, leg.fixed_center, leg.extensible_center, actuator.axial_stiffness, actuator.resonance, actuator.damping_ratio, amplifier.lag, amplifier.noise, sensor.range, gauge, control.modal_damping, robust.structure, hysteresis: records/reference-forc.csv (simulated)\n";
 
 /// Adds tables and trajectories.
 pub(crate) fn add_tables(crc: &mut Crc32) {

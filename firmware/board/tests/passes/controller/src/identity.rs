@@ -45,6 +45,7 @@ pub const ASSUMED: &[&str] = &[
     "sensor.range",
     "gauge",
     "control.modal_damping",
+    "robust.structure",
     "hysteresis: records/reference-forc.csv (simulated)",
 ];
 
