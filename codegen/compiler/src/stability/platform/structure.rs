@@ -1,9 +1,9 @@
 //! Structural modes: those that are known, as part of the plant, and those that are not, as a range in which every loop must be stable.
 //!
 //! The border of stability of a mode in all six legs, or on all six readings, follows from the eigenvalues of the open loop
-//! ([`Flexure::border`]). A mode of one leg or one gauge closes a loop of one signal with all others closed: L/(1 + L) of that
-//! leg or gauge is then used instead. Where these curves do not enter the declared range of f_n and ζ, no single mode in it makes
-//! the loop unstable: a mode far above the loop has no effect, and poles move continuously.
+//! ([`Flexure::border`]). Where it does not enter the declared range of f_n and ζ, no single mode in it makes the loop unstable: a
+//! mode far above the loop has no effect, and poles move continuously. A mode of one leg or one gauge, which has a smaller part in
+//! every mode of the platform, is not judged by itself; simulations try it.
 
 use core::f64::consts::{PI, TAU};
 
