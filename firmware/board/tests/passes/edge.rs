@@ -121,7 +121,10 @@ fn only_a_machine_that_runs_at_rest_waits_for_an_edge() {
         let on_edge = Request::Wave { action: WaveAction::StartOnEdge, words: Bytes(&settings) };
         assert_eq!(refused(&mut client, &on_edge), Refusal::State, "{why}");
         assert_eq!(stage(&mut client), Stage::None.word(), "{why}");
-        assert!(line.with(|rig| rig.exchange.source.wave.as_ref().is_none_or(|_| rig.exchange.source.waves())), "{why}");
+        assert!(
+            line.with(|rig| rig.exchange.source.wave.as_ref().is_none_or(|_| rig.exchange.source.waves())),
+            "{why}"
+        );
     };
     for phase in [Phase::Disarmed, Phase::Arming, Phase::Holding, Phase::RampingDown, Phase::Faulted] {
         line.with(|rig| rig.exchange.report.phase = phase);
