@@ -29,8 +29,8 @@ pub use supervisor::{FaultAction, LARGEST_PULSE, LONGEST_TIMEOUT, LegMakes, Robu
 pub use target::{Budget, ControllerOptions, Lint, Requirements, Scalar, SetpointKind, Target, Timing, TrackingLimit};
 pub(crate) use task_space::unit;
 pub use task_space::{
-    ControlMode, DynamicsChoice, Environment, Frames, Gains, Interaction, LARGEST_GAIN, PaperPath, Probe,
-    SetpointRules, StoredDesign, TaskSpace, Trajectory, TrajectoryKind,
+    CORRECTION_SHARE, ControlMode, DynamicsChoice, Environment, Frames, Gains, Interaction, LARGEST_GAIN, PaperPath,
+    Probe, SetpointRules, StoredDesign, TaskSpace, Trajectory, TrajectoryKind,
 };
 pub use trigger::{MAX_OUTPUTS, Trigger, TriggerDirection, TriggerKind};
 

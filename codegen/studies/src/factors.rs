@@ -232,7 +232,7 @@ impl Factors {
             };
             FactorRange { factor, range, origin }
         };
-        // A machine of rigid parts is not listed as one without structure.
+        // `structure` is listed only if it is on.
         let listed = |one: &FactorRange| one.factor != Factor::Structure || one.range[1] > 0.0;
         Self(Factor::ALL.into_iter().map(one).filter(listed).collect())
     }

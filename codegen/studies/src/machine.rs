@@ -19,7 +19,7 @@ use serde::{Deserialize, Serialize};
 
 use specgen_compiler::compile::Compilation;
 use specgen_language::files;
-use specgen_language::model::{self as language, Model, StructuralKind, TaskSpace};
+use specgen_language::model::{self as language, Model, StructuralKind, StructuralUncertainty, TaskSpace};
 use specgen_language::outcome::Failure;
 
 /// Gain of the reference leg's controller, 5 × 0.1262 µm/V, to which its measured gain is related, m/V.
@@ -210,6 +210,9 @@ fn known_structure(model: &Model) -> Imperfections {
     Imperfections { modes: model.structural_modes.iter().map(mode).collect(), ..Imperfections::default() }
 }
 
+/// Highest frequency of a random structural mode, Hz.
+const HIGHEST: f64 = 5e3;
+
 /// Ranges of a random structure with one mode that the controller does not know.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StructureRange {
@@ -229,14 +232,15 @@ impl StructureRange {
     pub fn of(model: &Model, machine: &Specimen) -> Self {
         let declared = &model.structure;
         let lowest = machine.structure().modes().0[0] / core::f64::consts::TAU;
+        let from_hz = declared.from.unwrap_or(StructuralUncertainty::FROM * lowest);
         let kind = |kind: &StructuralKind| match kind {
             StructuralKind::Leg => (ModePlace::Leg(None), None),
             StructuralKind::Gauge => (ModePlace::Gauge(None), Some(declared.gauge_participation)),
             StructuralKind::Frame => (ModePlace::Frame, Some(declared.frame_participation)),
         };
         Self {
-            from_hz: declared.from.unwrap_or(2.5 * lowest),
-            to_hz: 5e3,
+            from_hz,
+            to_hz: if from_hz > HIGHEST { from_hz } else { HIGHEST },
             damping_ratio: [declared.damping_ratio, 3.0 * declared.damping_ratio],
             kinds: declared.kinds.iter().map(kind).collect(),
         }

@@ -1,4 +1,4 @@
-//! Sources of the next tick's command beside the host: a wave, a pass, and a command that waits for an edge.
+//! Sources of the next tick's command besides the host: a wave, a pass, and a command that waits for an edge.
 
 use core::borrow::BorrowMut;
 

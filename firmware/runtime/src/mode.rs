@@ -43,7 +43,7 @@ impl ControlMode {
         !matches!(self, Self::F(_))
     }
 
-    /// Whether that feedback works without estimates, and so has `position_gains` in place of `gains`.
+    /// Whether (7) works without estimates and therefore uses `position_gains` instead of `gains`.
     #[inline]
     #[must_use]
     pub const fn own_gains(self) -> bool {

@@ -76,8 +76,8 @@ pub struct StructuralMode {
     pub participation: Option<f64>,
 }
 
-/// Cables on the platform at P_C: in each axis of {B} a spring k in parallel with dry friction that yields elastically, k
-/// too, before it slides.
+/// Cables on the platform at P_C: along each axis of {B}, a spring of stiffness k in parallel with dry friction, which is
+/// elastic with the same stiffness until it slides.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Cable {
@@ -103,7 +103,7 @@ pub struct Mains {
     pub phase_rad: f64,
 }
 
-/// See the module. By default there are none.
+/// Deviations from the ideal platform; none by default.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Imperfections {

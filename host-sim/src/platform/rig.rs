@@ -74,7 +74,7 @@ pub struct PlatformRig {
     last_readings: Six,
     force_sensor: ForceSensor,
     amplifiers: [Gaussian; 6],
-    /// Mains, drift and jitter of the gauges; none: nothing of them.
+    /// Mains, drift and jitter of the gauges; none for a platform without imperfections.
     imperfections: Option<Imperfections>,
     jitter: Gaussian,
     /// Since the preparation, s.
@@ -164,7 +164,9 @@ impl PlatformRig {
         for k in 0..6 {
             // Drawn in any case, so that a fault does not shift the noise of a run.
             let mut moved = distances[k] - self.rest_distances[k];
-            offsets.into_iter().for_each(|offsets| moved += offsets[k]);
+            if let Some(offsets) = &offsets {
+                moved += offsets[k];
+            }
             let reading = self.gauges[k].read(moved);
             let held = if reading > high {
                 high

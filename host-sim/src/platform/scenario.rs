@@ -19,9 +19,11 @@ pub fn select_at_equal_gains(controller: &mut dyn TickController, mode: u32) -> 
     let mut words = controller.default_config();
     let description = controller.description();
     description.set_config(&mut words, "mode", f64::from(mode))?;
-    let [from, to] = [description.config("kp[0]")?, description.config("position_kp[0]")?];
-    // k_p, k_I and k_v of six axes.
-    words.copy_within(from..from + 18, to);
+    for gain in ["kp", "ki", "kv"] {
+        let from = description.config(&format!("{gain}[0]"))?;
+        let to = description.config(&format!("position_{gain}[0]"))?;
+        words.copy_within(from..from + 6, to);
+    }
     controller.configure(&words)
 }
 

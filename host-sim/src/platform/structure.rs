@@ -1,12 +1,13 @@
 //! A rigid platform on six flexible legs.
 //!
 //! ```text
-//! M ḧ = J(h)ᵀ f + Q_contact(h) ,   f_i = k_i (d_i − Δl_i(h)) − c_i J_i(h) ḣ
+//! M ḧ = J(h)ᵀ f − K_j h + Q_contact(h) + Q_cable(h) ,   f_i = k_i (d_i − Δl_i(h)) − c_i J_i(h) ḣ
 //! ```
 //! h counts from rest, where weight and leg forces balance; f is the change of the leg forces since then. M is that of
 //! rest (over the travel of piezo legs it changes by 1e-4 and an inertial force by as much of itself; Coriolis forces are
 //! smaller still), lengths and directions of the legs and the contact are those of h. The change of the weight's moments
-//! with h is in the stiffness at rest.
+//! with h is in the stiffness at rest. So is K_j = Σ J_iᵀ (I − s_i s_iᵀ) k_i J_i, the stiffness of the legs across their axes at the
+//! platform joints. The force of the cable acts at P_C.
 //!
 //! Step: M, the stiffness at rest and the damping make a linear system, which is propagated exactly for free
 //! displacements that change linearly over the step. What the exact forces differ from the linear ones, some 1e-4 of

@@ -12,8 +12,9 @@ use specgen_studies::factors::UserRange;
 use specgen_studies::lessons::{self, Options};
 
 use super::line::Line;
+use super::number::number;
 use super::path_roles::{InputFile, OutputFile};
-use super::sim::{PlantArguments, bandwidth, frequency};
+use super::sim::{PlantArguments, frequency};
 
 /// Arguments of `learn`.
 #[derive(Args, Debug)]
@@ -33,8 +34,8 @@ pub struct Arguments {
     #[arg(long, value_name = "N", default_value_t = 5, allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(0..=1000))]
     passes: u32,
     /// Highest frequency to learn, Hz; lowered until every machine within [robust] converges. With --excite, the sweeps reach 1.6
-    /// times as far, at most 0.4 of the tick rate: 2000 shows structural modes up to 3.2 kHz.
-    #[arg(long, value_name = "HZ", value_parser = bandwidth, allow_negative_numbers = true, default_value_t = BANDWIDTH)]
+    /// times as far, at most 0.4 of the rate of the knots: at 10 kHz, 2000 shows structural modes up to 3.2 kHz.
+    #[arg(long, value_name = "HZ", value_parser = number("Hz", "a frequency from 0.001 to 4000 Hz", 1e-3..=4e3), allow_negative_numbers = true, default_value_t = BANDWIDTH)]
     bandwidth: f64,
     /// Range of an uncertainty, instead of that of [robust] or the default: `stiffness=2%`, `gain=0.9:1.1`, `delay_ticks=0`.
     #[arg(long, value_name = "NAME=RANGE", value_parser = UserRange::parse)]

@@ -66,10 +66,6 @@ pub(super) fn frequency(text: &str) -> Result<f64, String> {
     number("Hz", "a frequency from 0.001 to 1000 Hz", 1e-3..=1e3)(text)
 }
 
-pub(super) fn bandwidth(text: &str) -> Result<f64, String> {
-    number("Hz", "a frequency from 0.001 to 4000 Hz", 1e-3..=4e3)(text)
-}
-
 /// Options of the simulated legs.
 #[derive(Args, Debug)]
 pub struct PlantArguments {

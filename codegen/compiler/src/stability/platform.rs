@@ -35,7 +35,8 @@ use specgen_numerics::{Matrix6, jacobian, mass_matrix};
 pub use super::LARGEST_RADIUS;
 pub use channel::StructuralChannel;
 pub use closed_loop::{ClosedLoop, Conditions};
-pub use damping::{ActiveDamping, DampedLaw, DampedMode, SLOW};
+use damping::DampedLaw;
+pub use damping::{ActiveDamping, DampedMode, SLOW};
 pub use law::{LoopKind, Tuning, start_law, start_mode};
 pub use margins::{ClosedMode, ModeMargins};
 pub use modes::ModalBasis;
@@ -90,7 +91,7 @@ pub struct Design {
     /// Whether the law was searched, as the spec stores none.
     #[serde(skip)]
     pub searched: bool,
-    /// Lowest frequency of a structural mode that every control mode must bear, Hz.
+    /// Lowest frequency of a structural mode that every control mode must tolerate, Hz.
     pub structure_from: f64,
     /// Ω, rad/s: level bandwidth at which EWMA alone becomes unstable.
     pub bandwidth_limit: f64,
@@ -141,7 +142,7 @@ pub fn design(model: &Model, task: &TaskSpace, plant: &RestDynamics) -> Result<D
     let mut searched = false;
     let damping = task.active_damping.then(|| {
         searched = stored.is_none();
-        rule::damped(&mut closed_loop, limit, adapting, stored.map(DampedLaw::from), &demand)
+        rule::damped(&mut closed_loop, limit, adapting, stored.map(DampedLaw::from), &demand, &digest)
     });
     let corners = Corners::of(closed_loop, demand);
     let (closed_loop, demand) = (corners.closed_loop(), corners.demand());
@@ -233,7 +234,7 @@ pub fn closed_loop_of(model: &Model, task: &TaskSpace, plant: &RestDynamics) -> 
     let damping = basis.frequencies.map(|frequency| task.modal_damping * frequency / basis.frequencies[0]);
     let period = model.timing.period;
     let structure = channel::known(model, task, &basis, &plant.jacobian);
-    let notch = task.notch_damping.map(|ratio| Notch::of(&basis, &damping, ratio, period));
+    let notch = task.notch_damping.map(|ratio| Notch::of(&basis, &damping, &[ratio; 6], period));
     Some(ClosedLoop {
         basis,
         damping,

@@ -22,7 +22,7 @@ fn designed(edit: impl Fn(&mut Model, &mut TaskSpace)) -> Result<(Design, Closed
     Ok((found, closed_loop))
 }
 
-/// Every corner at which a loop must bear a mode: the loop with its lag, and the conditions.
+/// Every corner at which a loop must tolerate a mode: the loop with its lag, and the conditions.
 fn corners(closed_loop: &ClosedLoop) -> Vec<(ClosedLoop, Conditions)> {
     let mut all = vec![(closed_loop.clone(), Conditions::NOMINAL)];
     for stiffness in [0.9, 1.1] {
@@ -45,7 +45,7 @@ fn with(closed_loop: &ClosedLoop, flexure: Flexure, hertz: f64, damping_ratio: f
 }
 
 /// Whether the loop with the mode is stable at every corner, by the eigenvalues of one tick.
-fn bears(
+fn tolerates(
     closed_loop: &ClosedLoop,
     law: ControlMode,
     tuning: &Tuning,
@@ -65,12 +65,12 @@ fn needed(closed_loop: &ClosedLoop, tuning: &Tuning, flexure: Flexure, [low, hig
     let at = |share: f64| low * (high / low).powf(share);
     let one = |hertz: f64| {
         let (mut unstable, mut stable) = (0.0, 1.0);
-        if bears(closed_loop, COMBINED, tuning, flexure, hertz, 1e-5) {
+        if tolerates(closed_loop, COMBINED, tuning, flexure, hertz, 1e-5) {
             return 0.0;
         }
         for _ in 0..10 {
             let middle = if unstable == 0.0 { 0.1 * stable } else { f64::sqrt(unstable * stable) };
-            if bears(closed_loop, COMBINED, tuning, flexure, hertz, middle) {
+            if tolerates(closed_loop, COMBINED, tuning, flexure, hertz, middle) {
                 stable = middle
             } else {
                 unstable = middle
@@ -107,7 +107,7 @@ fn the_border_in_closed_form_is_that_of_the_eigenvalues() {
 
 /// A design with active damping is stable with every mode of the range, at every corner, by eigenvalues.
 #[test]
-fn a_design_bears_every_mode_of_its_range() {
+fn a_design_tolerates_every_mode_of_its_range() {
     for from in length(&[900.0][..], &[600.0, 900.0, 1200.0]) {
         let (found, closed_loop) = designed(|model, task| {
             model.structure.from = Some(*from);
@@ -119,8 +119,8 @@ fn a_design_bears_every_mode_of_its_range() {
             for flexure in KINDS {
                 for share in length(&[1.0, 1.2, 2.0][..], &[1.0, 1.05, 1.1, 1.2, 1.4, 1.7, 2.0, 2.5, 3.0, 4.0]) {
                     let hertz = from * share;
-                    let borne = bears(&closed_loop, law, found.tuning(law), flexure, hertz, 0.01);
-                    assert!(borne, "f0 {from}: {law} with {flexure:?} at {hertz} Hz");
+                    let tolerated = tolerates(&closed_loop, law, found.tuning(law), flexure, hertz, 0.01);
+                    assert!(tolerated, "f0 {from}: {law} with {flexure:?} at {hertz} Hz");
                 }
             }
         }
@@ -144,7 +144,7 @@ fn a_design_bears_every_mode_of_its_range() {
 }
 
 #[test]
-fn gains_that_do_not_bear_the_range_are_refused_and_what_is_offered_is_accepted() {
+fn gains_that_do_not_tolerate_the_range_are_refused_and_what_is_offered_is_accepted() {
     let (rule, _) = designed(|_, _| ()).unwrap();
     let strong = |factor: f64, from: f64| {
         designed(|model, task| {

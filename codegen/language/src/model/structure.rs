@@ -92,6 +92,9 @@ section! {
 }
 
 impl StructuralUncertainty {
+    /// Lowest frequency of such a mode over that of the lowest mode of the platform, if the spec gives none.
+    pub const FROM: f64 = 2.5;
+
     /// That of a spec without the section.
     pub(super) fn assumed() -> Self {
         Self {

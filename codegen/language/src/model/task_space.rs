@@ -8,6 +8,9 @@ use super::trigger::Trigger;
 use super::{LARGEST_TRAVEL, LARGEST_TURN};
 use crate::keys::declare::*;
 
+/// Largest `control.correction` as a share of the stroke.
+pub const CORRECTION_SHARE: f64 = 0.1;
+
 /// Largest gain and stiffness in a spec, in SI units: products with it stay finite in both scalars.
 pub const LARGEST_GAIN: f64 = 1e15;
 /// Default cutoff of the velocity filter, as a fraction of half the tick rate.

@@ -112,7 +112,7 @@ impl Outcome for IdentificationResult<Estimate<FrequencyResponse>> {
         );
         let _ = write!(
             text,
-            "spec lines:\n[actuator]\nresonance = \"{:.1} Hz\"  # static gain here: {:.5} um/V for small amplitude, below that of a large loop\ndamping_ratio = {:.4}\n[amplifier]\nlag = \"{:.4} ms\"\n{}with [control], [actuator] counts for every leg; for the leg of this record alone, write instead:\n{}{files}",
+            "spec lines:\n[actuator]\nresonance = \"{:.1} Hz\"  # static gain here: {:.5} um/V for small amplitude, below that of a large loop\ndamping_ratio = {:.4}\n[amplifier]\nlag = \"{:.4} ms\"\n{}with [control], [actuator] applies to every leg; for this leg alone, write instead:\n{}{files}",
             f.resonance.value,
             f.gain.value * 1e6,
             f.damping_ratio.value,

@@ -246,12 +246,12 @@ impl Outcome for Report<'_> {
 fn margins_of(job: &Job, tuned: &Compilation) -> Margins {
     let model = &tuned.model;
     let degrees = |phase: Option<f64>| phase.map(f64::to_degrees);
-    if let (Some(task), Some(design), Feasibility::Platform { closed_loop, .. }) =
+    if let (Some(task), Some(design), Feasibility::Platform { corners, .. }) =
         (&model.task_space, &tuned.design, &job.feasibility)
     {
         let (law, tuning) = design.law(model, task);
         let phase = phase_margin(|gain_ratio| {
-            closed_loop.transition(law, tuning, &Conditions { gain_ratio, ..Conditions::NOMINAL })
+            corners.closed_loop().transition(law, tuning, &Conditions { gain_ratio, ..Conditions::NOMINAL })
         });
         let found: Option<&ModeMargins> = design.margins.iter().find(|one| one.law == law);
         return Margins {

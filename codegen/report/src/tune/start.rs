@@ -90,8 +90,7 @@ fn shrunk(job: &Job, start: Setting) -> Option<Setting> {
 }
 
 fn relay_test(job: &Job, ui: &Ui) -> Result<Option<[Option<Ultimate>; 6]>, Failure> {
-    let (Some(task), Feasibility::Platform { closed_loop, .. }) = (&job.compiled.model.task_space, &job.feasibility)
-    else {
+    let (Some(task), Feasibility::Platform { corners, .. }) = (&job.compiled.model.task_space, &job.feasibility) else {
         return Ok(None);
     };
     ui.progress("relay feedback test of each axis, with the notch");
@@ -103,8 +102,9 @@ fn relay_test(job: &Job, ui: &Ui) -> Result<Option<[Option<Ultimate>; 6]>, Failu
     let radius = model.geometry.joint_radius();
     let lead = job.compiled.design.as_ref().map_or(0.0, |design| design.lead) / model.timing.period;
     // Only P/F has active damping.
+    let closed_loop = corners.closed_loop();
     let active_damping = closed_loop.active_damping.filter(|_| !job.space.alone);
-    let closed_loop = ClosedLoop { active_damping, ..closed_loop.as_ref().clone() };
+    let closed_loop = ClosedLoop { active_damping, ..closed_loop.clone() };
     relay::test(&scenario, &job.controller, &closed_loop, [radius, lead]).map(Some).map_err(run_failure)
 }
 

@@ -1,4 +1,5 @@
-//! What of an error repeats from pass to pass, in each mode and bin. Mains on a gauge, for example, is in every pass, but elsewhere.
+//! The part of an error that repeats from pass to pass, in each mode and bin. Mains hum on a gauge, for example, has another phase in every
+//! pass.
 //!
 //! ```text
 //! N = |E − E'|²/2                              two passes under the same correction; mean of near bins, at least white noise
@@ -7,6 +8,7 @@
 //! ```
 //! The first term learns what exceeds the noise. The second averages: it replaces noise that was learned before by the mean over the passes.
 
+use super::matrix::larger;
 use specgen_numerics::fft::Complex64;
 
 /// Bins with power up to this multiple of the noise count as noise.
@@ -62,10 +64,6 @@ impl Coherence {
             pairs.map(|(value, noise)| share(value.norm_sqr(), larger(*noise, white[mode]))).collect()
         })
     }
-}
-
-fn larger(a: f64, b: f64) -> f64 {
-    if b > a { b } else { a }
 }
 
 /// Share of a bin that exceeds its noise.

@@ -195,11 +195,11 @@ impl Learnable {
         closed_loop.correction_response(self.law, &self.tuning, conditions, &angles)
     }
 
-    /// The same with gauges that see the pose itself: what a motion that is known beforehand is prepared for.
+    /// The same loop with gauges that read the pose itself, without modes on their mounts or the frame: for `--prepare`.
     pub(super) fn of_pose(&self) -> Self {
-        let mut all = self.clone();
-        all.closed_loop.structure.retain(|one| !one.on_readings());
-        all
+        let mut ideal = self.clone();
+        ideal.closed_loop.structure.retain(|one| !one.on_readings());
+        ideal
     }
 
     /// G: the response without feedback.

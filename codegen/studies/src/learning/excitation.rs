@@ -13,12 +13,12 @@ use std::ops::ControlFlow;
 
 use specgen_numerics::fft::{self, Complex64};
 use specgen_numerics::nyquist::{Complex, plus, times};
-use specgen_runtime::playback::{self, Knot};
+use specgen_runtime::playback::Knot;
 
 use super::convergence::{Learnable, spacing};
 use super::matrix::{Matrix6c, inverse, multiply};
 use super::motion::Motion;
-use super::passes::{LearnError, ONSET, RepeatableMachine, followed, unlimited};
+use super::passes::{LearnError, ONSET, RepeatableMachine, followed, given, unlimited};
 use super::response::{Bin, Response};
 use super::table::knots;
 use super::update::{kept, mapped};
@@ -73,10 +73,10 @@ impl Excitation {
         let time = motion.scored.end as f64 * period;
         let [wish, fastest] = [BEYOND * bandwidth, RATE / (f64::from(spacing) * period)];
         let band = [1.0 / time, if wish < fastest { wish } else { fastest }];
-        // Limited by its rate at the end and by its size at the beginning.
-        let fastest = if band[1] < FAST { band[1] } else { FAST };
-        let rate = limit / (TAU * (fastest + SLOW[0]) * ONSET);
-        let size = limit / larger(0.0);
+        // Its rate is largest at its end, or at FAST; its size at the beginning.
+        let steepest = if band[1] < FAST { band[1] } else { FAST };
+        let rate = limit / (TAU * (steepest + SLOW[0]) * ONSET);
+        let size = limit / relative_amplitude(0.0);
         let bearable = WITHIN * if size < rate { size } else { rate };
         let wanted = OVER_NOISE * noise;
         let amplitude = if wanted > 0.0 && wanted < bearable { wanted } else { bearable };
@@ -134,7 +134,7 @@ impl Excitation {
                 return Err(LearnError::Ended);
             }
             let seen = unlimited(followed(machine.pass(motion, knots, self.spacing)?)?)?;
-            let given = (0..motion.corrected as u32).map(|tick| playback::at(knots, self.spacing, tick));
+            let given = given(knots, motion, self.spacing).into_iter();
             let shown = seen.measured[..motion.corrected].iter().map(|error| error.map(|axis| -axis));
             pairs.push([spectra(&mut { given }), spectra(&mut { shown })]);
         }
@@ -153,8 +153,9 @@ impl Excitation {
 /// Spectra of the corrections and the gauges of each pass.
 pub struct SweepSpectra {
     pairs: Vec<[[Vec<Complex64>; 6]; 2]>,
-    /// Distance of two lines, Hz, and how many of them are as good as one.
+    /// Spacing of the lines, Hz.
     line: f64,
+    /// Number of lines per independent one.
     tied: f64,
     /// Lowest and highest frequency, Hz.
     band: [f64; 2],
@@ -203,7 +204,7 @@ impl SweepSpectra {
 }
 
 /// Relative amplitude of the sweep at a frequency, Hz.
-fn larger(hertz: f64) -> f64 {
+fn relative_amplitude(hertz: f64) -> f64 {
     let fast = if hertz > FAST { FAST / hertz } else { 1.0 };
     fast * (1.0 + SLOW[0] / if hertz > SLOW[1] { hertz } else { SLOW[1] })
 }
@@ -220,7 +221,10 @@ fn sweep(ticks: usize, all: usize, period: f64, [low, high]: [f64; 2]) -> Vec<f6
                 return 0.0;
             }
             let hertz = low * libm::exp(growth * t);
-            larger(hertz) * fade(t) * fade(time - t) * libm::sin(TAU * low / growth * libm::expm1(growth * t))
+            relative_amplitude(hertz)
+                * fade(t)
+                * fade(time - t)
+                * libm::sin(TAU * low / growth * libm::expm1(growth * t))
         })
         .collect()
 }

@@ -142,7 +142,7 @@ fn errors<'a>(seen: &'a PassObservation, motion: &Motion) -> &'a [[f64; 6]] {
 }
 
 /// The correction that knots give, tick by tick, m and rad.
-fn given(played: &[Knot], motion: &Motion, spacing: u32) -> Vec<[f64; 6]> {
+pub(super) fn given(played: &[Knot], motion: &Motion, spacing: u32) -> Vec<[f64; 6]> {
     (0..motion.corrected as u32).map(|tick| playback::at(played, spacing, tick)).collect()
 }
 

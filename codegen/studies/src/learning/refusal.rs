@@ -1,7 +1,7 @@
-//! Reasons learning is refused.
+//! Reasons learning is refused, and limits of a correction.
 
 use specgen_compiler::compile::Compilation;
-use specgen_language::model::{Model, TaskSpace};
+use specgen_language::model::{CORRECTION_SHARE, Model, TaskSpace};
 use specgen_language::outcome::Failure;
 
 /// Message if learning with the model's response converges nowhere.
@@ -36,7 +36,7 @@ pub fn takes_correction(compiled: &Compilation) -> Result<&TaskSpace, Failure> {
 /// Largest permitted `control.correction`, m.
 #[must_use]
 pub fn largest_correction(model: &Model) -> f64 {
-    0.1 * model.actuator.stroke
+    CORRECTION_SHARE * model.actuator.stroke
 }
 
 /// How to avoid that a correction is limited: from the limit that suffices, that of the spec, and the largest permitted, m.

@@ -15,12 +15,15 @@ use serde::Serialize;
 use specgen_compiler::compile::Compilation;
 use specgen_compiler::lower::{leg_jacobian, poses_per_reading};
 use specgen_identify::Parameter;
-use specgen_numerics::nyquist::{Complex, over, plus, square, times};
+use specgen_numerics::nyquist::{Complex, Flexure, over, plus, square, times};
 use specgen_numerics::{Matrix6, multiply6};
 
 use super::convergence::Learnable;
-use super::matrix::{Matrix6c, inverse, multiply};
+use super::matrix::{Matrix6c, inverse, left, multiply};
 use super::response::Bin;
+
+/// Fall of χ² that one more parameter must bring, in units of χ² per degree of freedom.
+const PER_PARAMETER: f64 = 5.0;
 
 /// What a fit leaves in one direction: frequency, Hz, relative residual, weight.
 type Direction = Vec<(f64, Complex, f64)>;
@@ -101,6 +104,13 @@ pub struct Structure {
     pub misfit: f64,
 }
 
+impl Place {
+    /// Whether a mode there acts on readings; then its participation is free.
+    fn on_gauges(self) -> bool {
+        matches!(self, Self::Gauge(_) | Self::Gauges)
+    }
+}
+
 impl StructuralMode {
     /// A `[[mode]]` of a spec.
     #[must_use]
@@ -116,7 +126,7 @@ impl StructuralMode {
             "[[mode]]\nfrequency = \"{:.1} Hz\"  # ± {:.1}\ndamping_ratio = {:.4}  # ± {:.4}\nat = \"{at}\"\n",
             frequency.value, frequency.error, damping.value, damping.error
         );
-        if matches!(place, Place::Gauge(_) | Place::Gauges) {
+        if place.on_gauges() {
             lines.push_str(&format!("participation = {:.3}  # ± {:.3}\n", participation.value, participation.error));
         }
         lines
@@ -149,12 +159,8 @@ impl Resonance {
     /// h at a frequency, Hz.
     fn factor(&self, hertz: f64) -> Complex {
         let [frequency, ratio, part] = self.values;
-        let r = hertz / libm::exp(frequency);
-        let below = [1.0 - r * r, 2.0 * libm::exp(ratio) * r];
-        match self.place {
-            Place::Leg(_) | Place::Legs => over([1.0, 0.0], below),
-            Place::Gauge(_) | Place::Gauges => plus([1.0, 0.0], over([part * r * r, 0.0], below)),
-        }
+        let flexure = if self.place.on_gauges() { Flexure::Sensor(part) } else { Flexure::Series };
+        flexure.factor(hertz / libm::exp(frequency), libm::exp(ratio))
     }
 
     fn of_leg(&self, leg: usize) -> bool {
@@ -167,7 +173,7 @@ impl Resonance {
 
     /// Number of its parameters.
     fn free(&self) -> usize {
-        if matches!(self.place, Place::Gauge(_) | Place::Gauges) { 3 } else { 2 }
+        if self.place.on_gauges() { 3 } else { 2 }
     }
 }
 
@@ -235,7 +241,8 @@ struct Problem {
 }
 
 impl Learnable {
-    /// The structural modes that bins of a measured response show beyond the model. None if the geometry does not determine the pose.
+    /// The structural modes that bins of a measured response show beyond the model. None if the geometry does not determine the pose,
+    /// or if fewer bins can be used than the platform has parameters.
     #[must_use]
     pub fn structure(&self, compiled: &Compilation, bins: &[Bin]) -> Option<Structure> {
         let problem = Problem::new(self, compiled, bins)?;
@@ -243,14 +250,14 @@ impl Learnable {
         // are those of T.
         let mut open = problem.fitted(&problem.start, Vec::new(), STEPS, Domain::Open);
         let mut fit = problem.fitted(&open.platform, Vec::new(), FIRST_STEPS, Domain::Closed);
-        let mut unresolved = None;
+        let (mut modes, mut unresolved) = (Vec::new(), None);
         while fit.modes.len() < MOST {
             let found = problem.candidates(&open).into_iter().map(|mode| {
                 let modes = open.modes.iter().copied().chain([mode]).collect();
                 problem.fitted(&open.platform, modes, FIRST_STEPS, Domain::Open)
             });
             // In series with all legs and on all gauges with a = 1 are nearly the same: the one with fewer parameters counts.
-            let bound = |fit: &Fit| fit.cost + 5.0 * problem.parameters(fit) as f64 * problem.misfit(fit);
+            let bound = |fit: &Fit| fit.cost + PER_PARAMETER * problem.parameters(fit) as f64 * problem.misfit(fit);
             let Some(best) = found.min_by(|a, b| bound(a).total_cmp(&bound(b))) else { break };
             if open.cost - best.cost < SHOWN * problem.misfit(&best) {
                 break;
@@ -260,17 +267,16 @@ impl Learnable {
             if fit.cost - best.cost < SHOWN * problem.misfit(&best) {
                 break;
             }
-            let modes = problem.estimates(&best)?;
-            if modes.iter().any(|mode| mode.participation.value.abs() < LEAST_PART) {
+            let estimates = problem.estimates(&best)?;
+            if estimates.iter().any(|mode| mode.participation.value.abs() < LEAST_PART) {
                 break;
             }
-            if modes.iter().any(|mode| !mode.is_certain()) {
+            if estimates.iter().any(|mode| !mode.is_certain()) {
                 unresolved = best.modes.last().map(|mode| libm::exp(mode.values[0]));
                 break;
             }
-            fit = best;
+            (fit, modes) = (best, estimates);
         }
-        let mut modes = problem.estimates(&fit)?;
         modes.sort_by(|a, b| a.frequency.value.total_cmp(&b.frequency.value));
         let band = problem.band(&fit, unresolved);
         let misfit = problem.misfit(&fit);
@@ -384,10 +390,9 @@ impl Problem {
 
     /// T of a fit, and the factors of dT on both sides of dP.
     fn closed(point: &Point, at: &Evaluated) -> [Matrix6c; 3] {
-        let unit: Matrix6c = std::array::from_fn(|i| std::array::from_fn(|j| [f64::from(u8::from(i == j)), 0.0]));
-        let before = inverse(&sum(&unit, &multiply(&at.plant, &point.feedback), 1.0));
+        let before = inverse(&left(&multiply(&at.plant, &point.feedback), -1.0));
         let closed = multiply(&before, &at.plant);
-        let after = sum(&unit, &multiply(&point.feedback, &closed), -1.0);
+        let after = left(&multiply(&point.feedback, &closed), 1.0);
         [closed, before, after]
     }
 

@@ -71,7 +71,7 @@ impl Deviation {
             // The range check ensures an integer from 0 to 100.
             delay_ticks: of(Factor::DelayTicks) as u32,
             legs: [leg; LEGS],
-            // Random machines have one.
+            // Only random machines have one.
             structure: None,
         }
     }
@@ -126,7 +126,7 @@ impl Deviation {
     #[must_use]
     pub fn specimen(&self, model: &Model, task: &TaskSpace, leg: &LegParameters) -> Specimen {
         let mut specimen = machine::specimen(model, task, leg, None);
-        let known = specimen.clone();
+        let structure = self.structure.map(|shares| (shares, StructureRange::of(model, &specimen)));
         for ((leg, stiffness), deviation) in specimen.legs.iter_mut().zip(&mut specimen.stiffness).zip(&self.legs) {
             *leg = self.leg_of(leg, deviation);
             *stiffness *= deviation.stiffness;
@@ -136,8 +136,8 @@ impl Deviation {
         nominal.platform_inertia_kg_m2.as_flattened_mut().iter_mut().for_each(|moment| *moment *= self.mass);
         nominal.modal_damping = damped(nominal.modal_damping, self.damping);
         nominal.force_noise.iter_mut().for_each(|noise| *noise *= self.noise);
-        if let Some(shares) = &self.structure {
-            shares.add_to(&mut nominal.imperfections, &StructureRange::of(model, &known));
+        if let Some((shares, range)) = structure {
+            shares.add_to(&mut nominal.imperfections, &range);
         }
         specimen
     }

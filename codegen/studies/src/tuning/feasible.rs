@@ -38,9 +38,7 @@ pub enum Feasibility {
     },
     /// A platform.
     Platform {
-        /// The closed loop without the tuned settings.
-        closed_loop: Box<ClosedLoop>,
-        /// The same with every structural mode that it must bear.
+        /// The closed loop without the tuned settings, with the structural modes that it must tolerate.
         corners: Box<Corners>,
         /// Control modes that use the tuned parameters.
         laws: Vec<ControlMode>,
@@ -71,14 +69,8 @@ impl Feasibility {
             if own.own_gains() { &[LoopKind::Position] } else { &[LoopKind::Estimates, LoopKind::Combined] };
         laws.extend(kinds.iter().copied().flat_map(LoopKind::modes).filter(|law| *law != own));
         let demand = StructureDemand::of(model, &closed_loop.basis);
-        let corners = Box::new(Corners::of(closed_loop.clone(), demand));
-        Self::Platform {
-            closed_loop: Box::new(closed_loop),
-            corners,
-            laws,
-            ratios: model.adaptation.gain_ratio,
-            required,
-        }
+        let corners = Box::new(Corners::of(closed_loop, demand));
+        Self::Platform { corners, laws, ratios: model.adaptation.gain_ratio, required }
     }
 
     /// Whether `setting` is stable with the margins.
@@ -88,10 +80,11 @@ impl Feasibility {
             (Self::Legs { dynamics, adaptation, required }, Setting::Legs { level, drift }) => {
                 leg_holds(dynamics, adaptation, required, *level, *drift)
             }
-            (Self::Platform { closed_loop, corners, laws, ratios, required }, Setting::Platform { period, .. }) => {
+            (Self::Platform { corners, laws, ratios, required }, Setting::Platform { period, .. }) => {
                 let tuning = |law: &ControlMode| setting.tuning(law.own_gains());
-                laws.iter().all(|law| platform_holds(closed_loop, *law, &tuning(law), *ratios, required, *period))
-                    && laws.iter().all(|law| corners.bears(*law, &tuning(law)))
+                laws.iter()
+                    .all(|law| platform_holds(corners.closed_loop(), *law, &tuning(law), *ratios, required, *period))
+                    && laws.iter().all(|law| corners.tolerates(*law, &tuning(law)))
             }
             _ => false,
         }

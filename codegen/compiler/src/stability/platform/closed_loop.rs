@@ -105,7 +105,7 @@ impl ClosedLoop {
     }
 
     /// diag(ω⁻²) A: from a modal force to the leg motion that it requests.
-    pub(super) fn asked(&self, modal_force: &Matrix6) -> Matrix6 {
+    pub(super) fn requested_motion(&self, modal_force: &Matrix6) -> Matrix6 {
         core::array::from_fn(|i| {
             let square = self.basis.frequencies[i] * self.basis.frequencies[i];
             modal_force[i].map(|x| x / square)
@@ -303,7 +303,7 @@ impl<'a> Assembly<'a> {
         }
         let minus = core::array::from_fn(|i| scaled(-1.0, &seen[i]));
         let error = self.notched(self.layout.error_notch, &minus);
-        let proportional = self.of.asked(&self.of.basis.couple(&self.tuning.proportional));
+        let proportional = self.of.requested_motion(&self.of.basis.couple(&self.tuning.proportional));
         for (out, row) in feedback.iter_mut().zip(&proportional) {
             for (factor, signal) in row.iter().zip(&error) {
                 add(out, *factor, signal);
@@ -373,7 +373,7 @@ impl<'a> Assembly<'a> {
     fn load(&mut self, place: &[Signal; 6], seen: &[Signal; 6]) -> [Signal; 6] {
         let mut load = self.zeros();
         if self.of.measured && self.conditions.touching {
-            let fed = self.of.asked(&self.of.contact(true));
+            let fed = self.of.requested_motion(&self.of.contact(true));
             for (out, row) in load.iter_mut().zip(&fed) {
                 for (factor, signal) in row.iter().zip(place) {
                     add(out, *factor, signal);

@@ -42,7 +42,8 @@ impl ClosedLoop {
         let delay = Complex::new(cos, -sin);
         let e = Complex::new(1.0, 0.0) - delay;
         let period = self.period;
-        let gain = |gains: &[f64; 6], factor: Complex<f64>| complex(&self.asked(&self.basis.couple(gains)), factor);
+        let gain =
+            |gains: &[f64; 6], factor: Complex<f64>| complex(&self.requested_motion(&self.basis.couple(gains)), factor);
         let notch = self.notch.as_ref().map_or_else(ComplexMatrix::identity, |notch| sections(&notch.sections, delay));
         let mut feedback = ComplexMatrix::zeros();
         if law.feeds_back() {

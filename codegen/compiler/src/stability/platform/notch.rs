@@ -53,14 +53,15 @@ pub struct Notch {
 }
 
 impl Notch {
-    pub(super) fn of(basis: &ModalBasis, damping: &[f64; 6], notch_damping: f64, period: f64) -> Self {
+    /// `damping`: ζ of each mode; `notch_damping`: the one that its notch gives to it.
+    pub(super) fn of(basis: &ModalBasis, damping: &[f64; 6], notch_damping: &[f64; 6], period: f64) -> Self {
         Self {
             to_modal: basis.to_modal,
             from_modal: basis.from_modal,
             sections: core::array::from_fn(|i| {
                 let frequency = basis.frequencies[i];
                 if in_reach(frequency, period) {
-                    Biquad::notch(frequency, damping[i], notch_damping, period)
+                    Biquad::notch(frequency, damping[i], notch_damping[i], period)
                 } else {
                     Biquad::IDENTITY
                 }

@@ -7,7 +7,7 @@ use super::damping::ActiveDamping;
 use super::law::{LoopKind, Tuning};
 use super::margins::ModeMargins;
 use super::search::largest_stable;
-use super::structure::{Corners, MOST_DAMPING, StructureDemand};
+use super::structure::{Corners, StructureDemand};
 use super::{LARGEST_RADIUS, damping, nominal_conditions, notch, worst_radius};
 use specgen_language::diagnostic::{Code, Diagnostic, codes};
 use specgen_language::model::{Model, TaskSpace};
@@ -73,7 +73,7 @@ pub(super) fn check(
     if findings.is_empty() { Ok(()) } else { Err(findings) }
 }
 
-/// Lowest frequency of an unknown structural mode over that of the platform's lowest: below, no law that follows a path bears one.
+/// Lowest frequency of an unknown structural mode over that of the platform's lowest: below, no law that follows a path tolerates one.
 const LEAST_FROM: f64 = 1.6;
 
 /// Refuses a range of structural modes that begins too close to the modes of the platform.
@@ -122,41 +122,33 @@ struct Case<'a> {
 }
 
 impl Case<'_> {
-    /// The law with the largest radius, if that is too large; else the one that bears a structural mode least.
+    /// The law with the largest radius, if that is too large; else the one that needs the most damping of a structural mode.
     fn unstable(&self, laws: &[ControlMode], tuning: &Tuning) -> Option<Unstable> {
         let radius = |law: &ControlMode| (*law, worst_radius(self.closed_loop, *law, tuning, self.conditions));
         let worst = laws.iter().map(radius).filter(|(_, radius)| *radius > LARGEST_RADIUS);
         if let Some((law, radius)) = worst.reduce(|worst, one| if one.1 > worst.1 { one } else { worst }) {
             return Some(Unstable { code: codes::UNSTABLE_PLATFORM, message: self.what(law, radius) });
         }
-        let borne =
-            laws.iter().filter(|law| LoopKind::of(**law) != LoopKind::Open && !self.corners.bears(**law, tuning));
-        let demands = borne.filter_map(|law| self.corners.most_demanding(*law, tuning).map(|found| (*law, found)));
-        let (law, (kind, [frequency, damping])) =
-            demands.reduce(|worst, one| if one.1.1[1] > worst.1.1[1] { one } else { worst })?;
-        Some(Unstable { code: codes::STRUCTURE_UNSTABLE, message: self.what_structure(law, kind, frequency, damping) })
+        let closed = laws.iter().filter(|law| LoopKind::of(**law) != LoopKind::Open);
+        let found = closed.filter_map(|law| self.corners.most_demanding(*law, tuning).map(|mode| (*law, mode)));
+        let (law, mode) = found.reduce(|worst, one| if one.1.needed > worst.1.needed { one } else { worst })?;
+        let message = format!(
+            "control mode {law} is unstable with a structural mode that may exist: {} (at ±10 % of stiffness and gain, ±30 % of the \
+             amplifier's lag, one tick more)",
+            mode.describe()
+        );
+        Some(Unstable { code: codes::STRUCTURE_UNSTABLE, message })
     }
 
     fn is_stable(&self, laws: &[ControlMode], tuning: &Tuning) -> bool {
         laws.iter().all(|law| worst_radius(self.closed_loop, *law, tuning, self.conditions) <= LARGEST_RADIUS)
-            && laws.iter().all(|law| LoopKind::of(*law) == LoopKind::Open || self.corners.bears(*law, tuning))
+            && laws.iter().all(|law| LoopKind::of(*law) == LoopKind::Open || self.corners.tolerates(*law, tuning))
     }
 
     fn largest(&self, laws: &[ControlMode], tuning: impl Fn(f64) -> Tuning) -> Option<f64> {
         largest_stable(LOWEST, 1.0, 1.2, |factor| self.is_stable(laws, &tuning(factor)))
             .map(|limit| shown(SLACK * limit))
             .filter(|factor| self.is_stable(laws, &tuning(*factor)))
-    }
-
-    fn what_structure(&self, law: ControlMode, kind: &str, frequency: f64, damping: f64) -> String {
-        let demand = self.corners.demand();
-        let needed = if damping > MOST_DAMPING { format!("above {MOST_DAMPING}") } else { format!("{damping:.3}") };
-        format!(
-            "control mode {law} is unstable with a structural mode that may exist: a {kind} mode near {frequency:.0} Hz needs a \
-             damping ratio of {needed}, but may have {} (any from {:.0} Hz on; at ±10 % of stiffness and gain, ±30 % of the amplifier's \
-             lag, one tick more)",
-            demand.damping_ratio, demand.from
-        )
     }
 
     fn what(&self, law: ControlMode, radius: f64) -> String {

@@ -8,6 +8,7 @@
 use super::closed_loop::{ClosedLoop, Conditions};
 use super::damping::{self, DampedLaw};
 use super::law::{LoopKind, Tuning};
+use super::notch::Notch;
 use super::search::largest_stable;
 use super::structure::{Corners, StructureDemand};
 use super::{LARGEST_RADIUS, nominal_conditions};
@@ -91,11 +92,13 @@ pub(super) fn damped(
     adapting: Law,
     stored: Option<DampedLaw>,
     demand: &StructureDemand,
+    digest: &str,
 ) -> (Tuning, DampedLaw) {
     let start = start(closed_loop, limit);
-    let law = stored.unwrap_or_else(|| damping::search(closed_loop, adapting, &start, demand));
+    let law = stored.unwrap_or_else(|| damping::search(closed_loop, adapting, &start, demand, digest));
     closed_loop.active_damping = Some(law.sections);
-    closed_loop.notch = damping::notch_of(closed_loop, &law.notch_damping);
+    let ClosedLoop { basis, damping, period, .. } = closed_loop;
+    closed_loop.notch = closed_loop.notch.as_ref().map(|_| Notch::of(basis, damping, &law.notch_damping, *period));
     (start, law)
 }
 
@@ -167,7 +170,7 @@ fn shrink(
     for _ in 0..SHRINKS {
         let tried = tuning(factor);
         let stable = |law: ControlMode| asked.iter().all(|conditions| is_stable(closed_loop, law, &tried, conditions));
-        if laws.iter().all(|&law| stable(law) && corners.bears(law, &tried)) {
+        if laws.iter().all(|&law| stable(law) && corners.tolerates(law, &tried)) {
             return tried;
         }
         factor *= SHRINK;

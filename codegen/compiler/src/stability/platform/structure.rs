@@ -15,28 +15,38 @@ use super::closed_loop::{ClosedLoop, Conditions};
 use super::law::Tuning;
 use super::loop_gain::loci;
 use super::modes::ModalBasis;
-use specgen_language::model::{Model, StructuralKind};
+use specgen_language::model::{Model, StructuralKind, StructuralUncertainty};
 use specgen_numerics::nyquist::{Flexure, FlexureRange};
 use specgen_runtime::ControlMode;
 
-/// Corners at which a loop must bear a mode, besides the nominal point: stiffness, relative lag of the amplifier, delay in ticks, each
-/// with 0.7 of the damping.
-pub(super) const STIFFNESS: [f64; 2] = [0.9, 1.1];
-pub(super) const LAG: [f64; 2] = [0.7, 1.3];
-pub(super) const DELAY: [f64; 2] = [0.0, 1.0];
+/// Corners at which a loop must tolerate a mode, besides the nominal point: stiffness, relative lag of the amplifier, delay in ticks.
+const STIFFNESS: [f64; 2] = [0.9, 1.1];
+const LAG: [f64; 2] = [0.7, 1.3];
+const DELAY: [f64; 2] = [0.0, 1.0];
+/// Damping ratios at a corner, relative to the nominal ones.
+const DAMPING: f64 = 0.7;
 /// λ at each corner.
 pub(super) const RATIO: [f64; 2] = [0.9, 1.1];
-/// Lowest frequency of an unknown mode over that of the lowest mode of the platform, if the spec does not say.
-const FROM: f64 = 2.5;
+
+/// Conditions and relative lag of the amplifier at each corner; [`RATIO`] multiplies their loops.
+pub(super) fn corners() -> impl Iterator<Item = (Conditions, f64)> {
+    let at = |stiffness: f64, lag: f64, delay: f64| {
+        (Conditions { stiffness, damping: DAMPING, delay, ..Conditions::NOMINAL }, lag)
+    };
+    STIFFNESS
+        .into_iter()
+        .flat_map(move |stiffness| LAG.into_iter().flat_map(move |lag| DELAY.map(|delay| at(stiffness, lag, delay))))
+}
+
 /// Most damping of a structural mode: with more, it no longer rings.
-pub(super) const MOST_DAMPING: f64 = 0.3;
+const MOST_DAMPING: f64 = 0.3;
 /// Frequencies of a border, from the lowest mode of the platform to half the tick rate.
 const BINS: usize = 48;
 /// Frequencies at which the open loop is computed, and those about each mode of the platform.
 const POINTS: u32 = 200;
 const ABOUT: u32 = 24;
 
-/// What every loop must bear: any single structural mode of a range, and each of those that are suspected.
+/// What every loop must tolerate: any single structural mode of a range, and each of those that are suspected.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StructureDemand {
     /// Lowest frequency of an unknown mode, Hz.
@@ -65,7 +75,7 @@ impl StructureDemand {
             StructuralKind::Frame => Flexure::Sensor(declared.frame_participation),
         };
         Self {
-            from: declared.from.unwrap_or(FROM * basis.frequencies[0] / TAU),
+            from: declared.from.unwrap_or(StructuralUncertainty::FROM * basis.frequencies[0] / TAU),
             damping_ratio: declared.damping_ratio,
             flexures: declared.kinds.iter().map(flexure).collect(),
             suspects: vec![StructuralChannel {
@@ -102,6 +112,26 @@ impl Border {
     }
 }
 
+/// A structural mode with which a control mode is unstable.
+pub(super) struct UnstableMode {
+    kind: &'static str,
+    /// Hz.
+    frequency: f64,
+    /// ζ that it needs.
+    pub(super) needed: f64,
+    /// In words, the ζ that it has or may have.
+    given: String,
+}
+
+impl UnstableMode {
+    /// In words.
+    pub(super) fn describe(&self) -> String {
+        let Self { kind, frequency, needed, given } = self;
+        let needed = if *needed > MOST_DAMPING { format!("above {MOST_DAMPING}") } else { format!("{needed:.3}") };
+        format!("a {kind} mode near {frequency:.0} Hz needs a damping ratio of {needed}, but {given}")
+    }
+}
+
 /// The plant at every corner and frequency, which all control modes share.
 #[derive(Debug, Clone)]
 pub struct Corners {
@@ -115,25 +145,21 @@ pub struct Corners {
 pub(super) struct Loci(Vec<(f64, Complex<f64>)>);
 
 impl Corners {
-    /// Those of a loop, with what it must bear.
+    /// Those of a loop, with what it must tolerate.
     #[must_use]
     pub fn of(of: ClosedLoop, demand: StructureDemand) -> Self {
         let angles = angles(&of);
-        let corner = |stiffness: f64, damping: f64, delay: f64, lag: f64| {
-            let conditions = Conditions { stiffness, damping, delay, ..Conditions::NOMINAL };
+        let plants = std::iter::once((Conditions::NOMINAL, 1.0)).chain(corners()).map(|(conditions, lag)| {
             let modes = of.modal_responses(&conditions, lag, &angles);
             modes.iter().zip(&angles).map(|(modes, angle)| of.plant_at(modes, *angle)).collect()
-        };
-        let mut plants = vec![corner(1.0, 1.0, 0.0, 1.0)];
-        for stiffness in STIFFNESS {
-            for lag in LAG {
-                plants.extend(DELAY.map(|delay| corner(stiffness, 0.7, delay, lag)));
-            }
-        }
+        });
+        let plants = plants.collect();
         Self { of, demand, angles, plants }
     }
 
-    pub(super) fn closed_loop(&self) -> &ClosedLoop {
+    /// The loop.
+    #[must_use]
+    pub fn closed_loop(&self) -> &ClosedLoop {
         &self.of
     }
 
@@ -165,7 +191,7 @@ impl Corners {
 
     /// Whether a control mode is stable with every structural mode that it must bear, by the border of stability.
     #[must_use]
-    pub fn bears(&self, law: ControlMode, tuning: &Tuning) -> bool {
+    pub fn tolerates(&self, law: ControlMode, tuning: &Tuning) -> bool {
         let loci = self.loci(law, tuning);
         self.needed(&loci) <= self.demand.damping_ratio
             && self
@@ -175,19 +201,23 @@ impl Corners {
                 .all(|one| self.border(&loci, one.flexure).at(one.frequency / TAU) < one.damping_ratio)
     }
 
-    /// The kind, frequency (Hz) and damping ratio of the mode that a control mode bears least, at a suspected mode or in the range.
-    pub(super) fn most_demanding(&self, law: ControlMode, tuning: &Tuning) -> Option<(&'static str, [f64; 2])> {
+    /// Of the modes that a control mode does not tolerate, the one that needs the most damping.
+    pub(super) fn most_demanding(&self, law: ControlMode, tuning: &Tuning) -> Option<UnstableMode> {
         let loci = self.loci(law, tuning);
         let suspects = self.demand.suspects.iter().map(|one| {
             let frequency = one.frequency / TAU;
-            (kind_of(one.flexure), [frequency, self.border(&loci, one.flexure).at(frequency)])
+            let needed = self.border(&loci, one.flexure).at(frequency);
+            let given = format!("has {}", one.damping_ratio);
+            (needed >= one.damping_ratio, UnstableMode { kind: kind_of(one.flexure), frequency, needed, given })
         });
-        let ranges = self
-            .demand
-            .flexures
-            .iter()
-            .map(|flexure| (kind_of(*flexure), loci.demanded(*flexure, [self.demand.from, 0.5 / self.of.period])));
-        ranges.chain(suspects).reduce(|most, one| if one.1[1] > most.1[1] { one } else { most })
+        let least = self.demand.damping_ratio;
+        let ranges = self.demand.flexures.iter().map(|flexure| {
+            let [frequency, needed] = loci.demanded(*flexure, [self.demand.from, 0.5 / self.of.period]);
+            let given = format!("may have {least} (any from {:.0} Hz on)", self.demand.from);
+            (needed > least, UnstableMode { kind: kind_of(*flexure), frequency, needed, given })
+        });
+        let all = ranges.chain(suspects).filter_map(|(is_unstable, one)| is_unstable.then_some(one));
+        all.reduce(|most, one| if one.needed > most.needed { one } else { most })
     }
 
     /// The border of a control mode for one more structural mode.

@@ -4,12 +4,10 @@ use std::f64::consts::PI;
 
 use crate::diagnostic::codes;
 use crate::keys::fields::Fields;
+use crate::model::CORRECTION_SHARE;
 use crate::spec::findings::Findings;
 use crate::spec::keys;
 use crate::spec::text::number;
-
-/// Largest correction as a fraction of the stroke.
-const CORRECTION_SHARE: f64 = 0.1;
 
 /// `Some` in a spec with `[control]`.
 pub(super) fn there(f: &Fields) -> Option<()> {

@@ -8,7 +8,7 @@ use crate::spec::findings::Findings;
 use crate::spec::keys::{self, MAX_TABLES};
 use crate::spec::text::number;
 
-/// Two modes of one place are the same mode if their frequencies differ by less than this fraction.
+/// Two modes at the same place count as one if their frequencies differ by less than this fraction.
 const SAME: f64 = 0.01;
 
 /// A leg has no participation; that of a gauge is above 0, that of the frame below.
