@@ -1,8 +1,10 @@
 //! `specgen robust` as a user runs it: exact replay, threads, gates, divergence, refusals.
 
 use std::collections::BTreeSet;
+use std::fs;
 
-use crate::support::{Folder, Run, contents, length};
+use crate::support::{Folder, Run, contents, length, repository};
+use host_sim::plant::REFERENCE_LEG;
 use serde_json::Value;
 use specgen::compile::compile;
 use specgen::model::AdaptationMode;
@@ -93,6 +95,41 @@ fn a_leg_that_is_short_of_voltage_is_said_to_be_at_its_limit() {
     let run = folder.run(&["robust", "legs.toml", "--vary", "gain=0.5:0.5", "--replay", "gain"]);
     run.says(1, &["not robust"]);
     assert!(run.stdout.contains(", a leg at its limit in "), "{}", run.stdout);
+}
+
+/// Ten in the short run, 100 in the full one, on legs of each class.
+#[test]
+fn random_machines_with_a_mode_soft_joints_a_cable_mains_drift_and_jitter_are_stable() {
+    let folder = Folder::new();
+    // Plays that widen with the rate: by 20 % at 500 V/s.
+    let widening = REFERENCE_LEG.replace("\"kappa\": 1.2445442636136678e-06", "\"kappa\": 0.06");
+    assert_ne!(widening, REFERENCE_LEG);
+    folder.write("widening.json", &widening);
+    let damped = fs::read_to_string(repository().join("specs/features/platform-damping.toml")).unwrap();
+    let spec = "damped.toml";
+    folder.write(spec, damped.replace("../records", "records"));
+    for plant in length(&["plays"][..], &["plays", "bouc-wen", "widening.json"]) {
+        let study = |structure: &str| {
+            let vary = format!("structure={structure}");
+            let draws = length("10", "100");
+            let arguments = ["robust", spec, "--draws", draws, "--vary", &vary, "--seed", "3", "--plant", plant];
+            let report = folder.json(&arguments).value["result"].clone();
+            let runs = report["runs"].as_array().unwrap().clone();
+            runs.iter().filter(|run| run["drawn"] == true).map(|run| run["outcome"]["ran"].clone()).collect::<Vec<_>>()
+        };
+        let (with, without) = (study("1"), study("0"));
+        assert_eq!(with.len(), length(10, 100));
+        let mut ratios: Vec<f64> = with
+            .iter()
+            .zip(&without)
+            .map(|(with, without)| with["error_nm"].as_f64().unwrap() / without["error_nm"].as_f64().unwrap())
+            .collect();
+        ratios.sort_by(f64::total_cmp);
+        let (median, most) = (ratios[ratios.len() / 2], ratios[ratios.len() - 1]);
+        println!("{plant}: error with the structure over that without, median {median:.2}, worst {most:.2}");
+        assert!(median < 1.5 && most < 2.0, "{plant}: {ratios:.2?}");
+        assert!(ratios[0] != 1.0, "the structure changes nothing");
+    }
 }
 
 /// The nominal machine here and the spec's own row of `tune` have the same figure.

@@ -10,7 +10,7 @@ use host_sim::closed_loop::{LEGS, RunError};
 use host_sim::plant::{LegParameters, NoiseParameters};
 use host_sim::platform::rig::{Noise, OnBoard, PlatformRig, RunOptions};
 use host_sim::platform::{
-    GaugeSignal, Imperfections, Joints, Mains, ModePlace, PlatformParameters, PlatformScenario, Probe, Specimen,
+    Cable, GaugeSignal, Imperfections, Joints, Mains, ModePlace, PlatformParameters, PlatformScenario, Probe, Specimen,
     StructuralMode, UserFrames,
 };
 use host_sim::scenario::LegScenario;
@@ -251,8 +251,12 @@ impl StructureRange {
 const STIFFEST_JOINT: f64 = 0.05;
 /// Largest amplitude of the mains in a gauge, m, and their frequency, Hz.
 const MAINS: (f64, f64) = (2e-9, 50.0);
-/// Fastest drift of a gauge, m/s.
-const DRIFT: f64 = 20e-9;
+/// Fastest drift of a gauge, m/s: 0.1 m of steel that warms up by 0.1 K a minute.
+const DRIFT: f64 = 2e-9;
+/// Stiffest cable, N/m, and its largest friction, N.
+const CABLE: (f64, f64) = (1e4, 0.1);
+/// Largest jitter of the instant of reading, s rms.
+const JITTER: f64 = 1e-6;
 
 /// A random structure as shares (0 to 1) of its ranges.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -265,6 +269,10 @@ pub struct StructureShares {
     pub mains: [f64; 3],
     /// Drift of each gauge, either way.
     pub drift: [f64; LEGS],
+    /// Cable: stiffness and friction along each axis.
+    pub cable: [f64; 2],
+    /// Jitter of the instant of reading.
+    pub jitter: f64,
 }
 
 impl StructureShares {
@@ -290,6 +298,10 @@ impl StructureShares {
             phase_rad: core::f64::consts::TAU * phase,
         });
         machine.gauge_drift_m_per_s = self.drift.map(|share| DRIFT * (2.0 * share - 1.0));
+        let [stiffness, friction] = self.cable;
+        machine.cable =
+            Some(Cable { stiffness_n_per_m: [CABLE.0 * stiffness; 3], friction_n: [CABLE.1 * friction; 3] });
+        machine.timing_jitter_s = JITTER * self.jitter;
     }
 }
 

@@ -107,6 +107,8 @@ impl Deviation {
             joints: unit(&mut rng),
             mains: std::array::from_fn(|_| unit(&mut rng)),
             drift: std::array::from_fn(|_| unit(&mut rng)),
+            cable: std::array::from_fn(|_| unit(&mut rng)),
+            jitter: unit(&mut rng),
         });
         Self { mass, damping, noise, delay_ticks, legs, structure }
     }
