@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use std::time::Duration;
 
 use host_sim::controller::{Controller, TickController};
@@ -69,6 +69,30 @@ pub fn image_target() -> PathBuf {
 #[must_use]
 pub fn length<T>(short: T, long: T) -> T {
     if std::env::var_os("SPECGEN_FULL").is_some() { long } else { short }
+}
+
+/// Keys of `[control]`: active damping with the design that `specs/features/platform-damping.toml` stores. It is that of every spec
+/// with the platform, period and lags of `specs/reference.toml`, so that tests do not search it again, which takes seconds.
+///
+/// # Panics
+/// If that spec stores none.
+#[must_use]
+pub fn active_damping() -> String {
+    let text = fs::read_to_string(repository().join("specs/features/platform-damping.toml")).expect("a spec");
+    let (_, design) = text.split_once("[control.design]\n").expect("a stored design");
+    let keys = design.lines().map(|line| match line.starts_with(char::is_alphabetic) {
+        true => format!("\ndesign.{line}"),
+        false => format!("\n{line}"),
+    });
+    std::iter::once("active_damping = true".to_owned()).chain(keys).collect()
+}
+
+/// Edit of the reference spec: with [`active_damping`].
+#[must_use]
+pub fn damped() -> (&'static str, &'static str) {
+    static DAMPED: OnceLock<String> = OnceLock::new();
+    let notch = "notch_damping   = 1.0";
+    (notch, DAMPED.get_or_init(|| format!("{notch}\n{}", active_damping())))
 }
 
 /// The larger of two errors. Unlike `f64::max` it keeps a NaN, which no bound admits.

@@ -13,7 +13,7 @@ use specgen::compile::Compilation;
 use specgen::model::Mcu;
 use specgen::target::Image;
 use specgen::verify;
-use specgen_tests::{Emitted, assert_same_bits, column, host_trace, integers};
+use specgen_tests::{Emitted, assert_same_bits, column, damped, host_trace, integers};
 
 /// Ticks of each mode under the hostile record.
 fn ticks() -> usize {
@@ -42,8 +42,6 @@ const PARTS: (&str, &str) = (
     "interaction     = \"none\"",
     "active_damping  = true\nhand_over       = true\ncorrection      = \"2 um\"\ninteraction     = \"none\"",
 );
-/// Active damping of the modes.
-pub const DAMPED: (&str, &str) = ("notch_damping   = 1.0", "notch_damping   = 1.0\nactive_damping  = true");
 /// On-board trajectories ten times as fast, so that a stretch of the hostile record sees most of one.
 pub const FAST: (&str, &str) = ("frequency = \"1 Hz\"", "frequency = \"10 Hz\"");
 
@@ -61,7 +59,7 @@ fn compare(name: &str, edits: &[(&str, &str)], mcus: &[Mcu]) {
         // The controller keeps these settings.
         let Compilation { model, ir, .. } = &*emitted.compiled;
         let tracking = verify::exercise(&mut controller, model, ir, tracked()).unwrap();
-        tracks(&tracking, what, edits.contains(&PARTS) || edits.contains(&DAMPED));
+        tracks(&tracking, what, edits.contains(&PARTS) || edits.contains(&damped()));
         for image in &images {
             for (record, host, ticks) in [("hostile", &hostile, ticks()), ("tracking", &tracking, tracked() as usize)] {
                 assert_eq!(host.len(), ticks);
@@ -137,7 +135,8 @@ fn covers(trace: &Trace, what: &str, measured: bool) {
 #[test]
 fn f64_on_the_host_and_the_m7_is_equal_in_every_bit_of_every_mode() {
     // In the short run with active damping, whose supervisor is compared on the same image.
-    let edits = specgen_tests::length(&[DAMPED, FAST][..], &[FAST]);
+    let damped = [damped(), FAST];
+    let edits = specgen_tests::length(&damped[..], &[FAST]);
     compare("platform-bits-f64", edits, &[Mcu::Mps2An500]);
 }
 

@@ -15,6 +15,7 @@
 //! | [`largest`], [`simplex`] | where a condition ceases to hold, by bisection; where a cost is least |
 //! | [`Cma`] | global search for the least cost |
 //! | [`Resolvent`] | what a sampled system answers at each frequency |
+//! | [`Loci`] | structural modes with which a loop of six modes is on the border of stability |
 //! | [`steady_covariances`] | what white noise makes of the states of a sampled system |
 //! | [`fft`] | Fourier transforms |
 //! | [`nyquist`] | sensitivity and stability of a loop of one signal |
@@ -32,6 +33,7 @@ pub mod fft;
 mod form;
 mod jury;
 mod kernels;
+mod loci;
 mod matrix;
 pub mod nnls;
 pub mod nyquist;
@@ -53,6 +55,7 @@ pub use jury::{ewma_limit, pcc_limit};
 pub use kernels::{
     Kernels, coriolis, displacements, expand_leg_forces, gravity, jacobian, leg_forces, mass_matrix, pivot_ratio,
 };
+pub use loci::{ComplexMatrix, Loci, product};
 pub use matrix::{Matrix, Matrix6, multiply6, transpose6};
 pub use resolvent::Resolvent;
 pub use search::{largest, simplex};

@@ -113,6 +113,34 @@ impl Flexure {
         };
         (square > 0.0).then_some([ratio, -0.5 * imaginary / root])
     }
+
+    /// Whether [`Flexure::border`] may give f_n/f above `least[0]` and ζ above `least[1]`, both from 0 on: false only where it certainly
+    /// does not. It needs no division and no root.
+    #[inline]
+    #[must_use]
+    pub fn may_exceed(self, loop_gain: Complex, distance: Complex, least: [f64; 2]) -> bool {
+        // The numbers of `border` times the denominator d = |…|²: d·square and d·imaginary.
+        let (below, share) = match self {
+            Self::Series => ([1.0 - distance[0], -distance[1]], 1.0),
+            Self::Sensor(share) => ([1.0 + loop_gain[0] - distance[0], loop_gain[1] - distance[1]], share),
+        };
+        let imaginary = share * (loop_gain[1] * below[0] - loop_gain[0] * below[1]);
+        if imaginary >= 0.0 {
+            return false;
+        }
+        let real = share * (loop_gain[0] * below[0] + loop_gain[1] * below[1]);
+        let norm = square(below);
+        let [frequency, damping] = least.map(|value| value * value * (1.0 - Self::SLACK));
+        let (root, far_enough) = match self {
+            Self::Series => (norm + real, norm >= frequency * (norm + real - Self::SLACK * norm)),
+            Self::Sensor(_) => (norm - real, norm * (1.0 + Self::SLACK) - real >= frequency * norm),
+        };
+        let smallest = 4.0 * damping * (root - Self::SLACK * norm) * norm;
+        far_enough && imaginary * imaginary * (1.0 + Self::SLACK) >= smallest
+    }
+
+    /// Relative, far above the rounding errors of [`Flexure::border`].
+    const SLACK: f64 = 1e-9;
 }
 
 /// A range of structural modes, any single one of which a loop may have.
@@ -131,7 +159,7 @@ pub struct FlexureRange {
 impl FlexureRange {
     /// Number of points on the circle.
     const POINTS: u32 = 12;
-    /// Weight of a share of f_n against one of ζ in [`FlexureRange::depth`].
+    /// Weight of a share of f_n against one of ζ in a depth.
     const STEEP: f64 = 40.0;
 
     /// The range of modes with which |1 + L·factor| must be at least `distance` everywhere.
@@ -146,26 +174,35 @@ impl FlexureRange {
     }
 
     /// How far a mode within the range would have to change until |1 + L·factor| is no longer below the distance at this frequency:
-    /// zero if no mode does that, else the smaller of ln(ζ/ζ of the range) and a multiple of ln(f_n/from), as a penalty.
-    #[must_use]
-    pub fn depth(&self, loop_gain: Complex, frequency: f64) -> f64 {
-        let mut most = 0.0;
+    /// zero if no mode does that, else the smaller of ln(ζ/ζ of the range) and a multiple of ln(f_n/from), as a penalty. `depth` becomes
+    /// this if it is larger.
+    fn deepen(&self, loop_gain: Complex, frequency: f64, depth: &mut Depth) {
         for flexure in &self.flexures {
             for distance in &self.distances {
+                let least = [self.from / frequency * depth.factors[0], self.damping_ratio * depth.factors[1]];
+                if !flexure.may_exceed(loop_gain, *distance, least) {
+                    continue;
+                }
                 let Some([ratio, damping]) = flexure.border(loop_gain, *distance) else { continue };
                 if ratio * frequency <= self.from || damping <= self.damping_ratio {
                     continue;
                 }
                 let above = Self::STEEP * libm::log(ratio * frequency / self.from);
                 let damped = libm::log(damping / self.damping_ratio);
-                let depth = if above < damped { above } else { damped };
-                if depth > most {
-                    most = depth;
+                let found = if above < damped { above } else { damped };
+                if found > depth.most {
+                    *depth = Depth { most: found, factors: [libm::exp(found / Self::STEEP), libm::exp(found)] };
                 }
             }
         }
-        most
     }
+}
+
+/// The largest [`FlexureRange::deepen`] so far.
+struct Depth {
+    most: f64,
+    /// f_n over the lowest and ζ over the least of the range, above both of which a mode is deeper.
+    factors: [f64; 2],
 }
 
 /// What a loop bears.
@@ -179,7 +216,7 @@ pub struct Tolerance {
     pub depth: f64,
 }
 
-/// Stability and largest |S| of a loop, as in [`sensitivity`], and the largest [`FlexureRange::depth`] over `frequencies`.
+/// Stability and largest |S| of a loop, as in [`sensitivity`], and the largest depth of its border over `frequencies`.
 #[must_use]
 pub fn tolerance(
     plant: &[Complex],
@@ -188,7 +225,7 @@ pub fn tolerance(
     frequencies: &[f64],
     range: Option<&FlexureRange>,
 ) -> Tolerance {
-    let (mut most, mut depth) = (0.0, 0.0);
+    let (mut most, mut depth) = (0.0, Depth { most: 0.0, factors: [1.0; 2] });
     let stable = sensitivity(plant, controller, cancelled, |k, s| {
         if s > most {
             most = s;
@@ -196,13 +233,10 @@ pub fn tolerance(
         let Some(range) = range else { return };
         // Below a quarter of the lowest mode |L| would have to be within a sixteenth of 1.
         if frequencies[k] > 0.25 * range.from {
-            let found = range.depth(over(times(plant[k], controller[k]), cancelled[k]), frequencies[k]);
-            if found > depth {
-                depth = found;
-            }
+            range.deepen(over(times(plant[k], controller[k]), cancelled[k]), frequencies[k], &mut depth);
         }
     });
-    Tolerance { stable, sensitivity: libm::sqrt(most), depth }
+    Tolerance { stable, sensitivity: libm::sqrt(most), depth: depth.most }
 }
 
 #[cfg(test)]
@@ -228,6 +262,33 @@ mod tests {
             }
         }
         assert!(found > 300, "{found}");
+    }
+
+    /// What is settled without a division is what the border settles.
+    #[test]
+    fn a_mode_that_needs_more_damping_is_never_passed_over() {
+        let (mut exceeding, mut settled) = (0, 0);
+        for flexure in [Flexure::Series, Flexure::Sensor(0.5), Flexure::Sensor(-0.1), Flexure::Sensor(3.0)] {
+            for k in 0..4000_u32 {
+                let (size, angle) = (libm::exp(0.02 * f64::from(k % 400) - 6.0), 0.7 * f64::from(k));
+                let loop_gain = [size * libm::cos(angle), size * libm::sin(angle)];
+                for distance in [[0.0, 0.0], [0.4, 0.0], [-0.1, 0.3]] {
+                    let exact = flexure.border(loop_gain, distance);
+                    let [ratio, damping] = exact.unwrap_or([0.0; 2]);
+                    let close = 1.0 - 1e-14;
+                    for least in [[0.0, 0.0], [0.8, 0.01], [1.2, 0.0], [0.0, 0.1], [close * ratio, close * damping]] {
+                        let least = least.map(|value| if value > 0.0 { value } else { 0.0 });
+                        let may = flexure.may_exceed(loop_gain, distance, least);
+                        if exact.is_some() && ratio > least[0] && damping > least[1] {
+                            exceeding += 1;
+                            assert!(may, "{flexure:?} {loop_gain:?} {distance:?} {least:?}: {exact:?}");
+                        }
+                        settled += u32::from(!may);
+                    }
+                }
+            }
+        }
+        assert!(exceeding > 30_000 && settled > 100_000, "{exceeding} {settled}");
     }
 
     /// L = k z⁻¹/(1 − p z⁻¹) is stable for −(1 + p) < −k < 1 − p … |p − k| < 1; an integrator for 0 < k < 2.

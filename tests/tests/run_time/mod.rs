@@ -338,8 +338,9 @@ const PARTS: (&str, &str) = (
 
 #[test]
 fn a_platform_with_every_part_of_the_law_has_the_bits_of_the_emitted_one() {
-    let parts = "[control]\nactive_damping = true\nhand_over = true\ncorrection = \"2 um\"";
-    alike("parts-f32", "features/triggers.toml", &[("[control]", parts)]);
+    let damping = specgen_tests::active_damping();
+    let parts = format!("[control]\nhand_over = true\ncorrection = \"2 um\"\n{damping}");
+    alike("parts-f32", "features/triggers.toml", &[("[control]", &parts)]);
 }
 
 #[test]

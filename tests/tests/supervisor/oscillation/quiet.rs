@@ -10,7 +10,7 @@ use std::fs;
 
 use super::super::bench::{ACKNOWLEDGE, ARM, HOLD, HOLDING, NOTHING, RAMP_DOWN, RUN, RUNNING};
 use super::machine::{Machine, Six};
-use super::{DAMPED, OSCILLATION, in_micrometres};
+use super::{OSCILLATION, in_micrometres};
 
 /// Random numbers.
 struct RandomSource(ChaCha8Rng);
@@ -373,8 +373,9 @@ fn nothing_that_a_sound_machine_does_is_taken_for_an_oscillation() {
     let ticks = specgen_tests::length(18_000, each);
     let mut all: QuietResult = (0, Vec::new());
     let mut used = 0;
+    let damped = [specgen_tests::damped()];
     for (number, (spec, edits)) in
-        names.iter().map(|name| (name.as_str(), &[][..])).chain([("reference.toml", &[DAMPED][..])]).enumerate()
+        names.iter().map(|name| (name.as_str(), &[][..])).chain([("reference.toml", &damped[..])]).enumerate()
     {
         let name = format!("oscillation-quiet-{number}");
         let path = specs.join(spec);

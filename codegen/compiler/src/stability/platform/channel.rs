@@ -7,10 +7,7 @@ use nalgebra::Complex;
 use super::modes::ModalBasis;
 use specgen_language::model::{Model, Probe, StructuralKind, StructuralMode, TaskSpace};
 use specgen_numerics::nyquist::Flexure;
-use specgen_numerics::{Matrix, Matrix6, cross, dot, multiply6};
-
-/// A 6×6 matrix of complex numbers.
-pub(super) type ComplexMatrix = nalgebra::Matrix6<Complex<f64>>;
+use specgen_numerics::{ComplexMatrix, Matrix, Matrix6, cross, dot, multiply6};
 
 /// The `[[mode]]` of a spec, as parts of the plant; `jacobian`: ∂l/∂h.
 pub(super) fn known(model: &Model, task: &TaskSpace, basis: &ModalBasis, jacobian: &Matrix6) -> Vec<StructuralChannel> {

@@ -10,12 +10,11 @@ use core::f64::consts::TAU;
 
 use nalgebra::Complex;
 
-use super::channel::ComplexMatrix;
 use super::closed_loop::{ClosedLoop, Conditions};
 use super::law::Tuning;
 use super::notch::Biquad;
 use super::sampled::{PLACE, Plant, shown};
-use specgen_numerics::Matrix6;
+use specgen_numerics::{ComplexMatrix, Matrix6, product};
 use specgen_runtime::{ControlMode, Law};
 
 fn complex(matrix: &Matrix6, factor: Complex<f64>) -> ComplexMatrix {
@@ -36,19 +35,24 @@ fn sections(sections: &[Biquad; 6], delay: Complex<f64>) -> ComplexMatrix {
 }
 
 impl ClosedLoop {
-    /// C at the angle ωT.
-    pub(super) fn controller_at(&self, law: ControlMode, tuning: &Tuning, angle: f64) -> ComplexMatrix {
+    /// C at an angle ωT.
+    pub(super) fn controller(&self, law: ControlMode, tuning: &Tuning) -> impl Fn(f64) -> ComplexMatrix {
+        let gain = |gains: &[f64; 6]| self.requested_motion(&self.basis.couple(gains));
+        let gains = [&tuning.proportional, &tuning.integral, &tuning.derivative].map(gain);
+        move |angle| self.controller_at(law, tuning, &gains, angle)
+    }
+
+    fn controller_at(&self, law: ControlMode, tuning: &Tuning, gains: &[Matrix6; 3], angle: f64) -> ComplexMatrix {
         let (sin, cos) = libm::sincos(angle);
         let delay = Complex::new(cos, -sin);
         let e = Complex::new(1.0, 0.0) - delay;
         let period = self.period;
-        let gain =
-            |gains: &[f64; 6], factor: Complex<f64>| complex(&self.requested_motion(&self.basis.couple(gains)), factor);
+        let [proportional, integral, derivative] = gains;
         let notch = self.notch.as_ref().map_or_else(ComplexMatrix::identity, |notch| sections(&notch.sections, delay));
         let mut feedback = ComplexMatrix::zeros();
         if law.feeds_back() {
-            let integral = gain(&tuning.integral, Complex::new(period, 0.0) / e);
-            feedback = (gain(&tuning.proportional, Complex::new(1.0, 0.0)) + integral) * notch;
+            let integral = complex(integral, Complex::new(period, 0.0) / e);
+            feedback = product(&(complex(proportional, Complex::new(1.0, 0.0)) + integral), &notch);
         }
         let mut all = feedback;
         let [level, drift] = [tuning.level_bandwidth * period, tuning.drift_bandwidth * period];
@@ -58,12 +62,12 @@ impl ClosedLoop {
             } else {
                 Complex::new(level, 0.0) / e
             };
-            all += notch * (ComplexMatrix::identity() + feedback * delay) * estimate;
+            all += product(&notch, &(ComplexMatrix::identity() + feedback * delay)) * estimate;
         }
         if tuning.derivative != [0.0; 6] {
             let pole = libm::exp(-self.velocity_cutoff * period);
             let rate = e * ((1.0 - pole) / period) / (Complex::new(1.0, 0.0) - delay * pole);
-            all += gain(&tuning.derivative, rate);
+            all += complex(derivative, rate);
         }
         match self.active_damping.as_ref().filter(|_| law.damps_modes()) {
             Some(damping) => all + sections(damping, delay),
@@ -112,54 +116,6 @@ impl ClosedLoop {
         }
         plant
     }
-}
-
-/// Eigenvalues of the open loop. Modes that are not coupled keep their own.
-pub(super) fn loci(matrix: &ComplexMatrix) -> [Complex<f64>; 6] {
-    let mut found = [Complex::new(0.0, 0.0); 6];
-    let mut done = [false; 6];
-    for first in 0..6 {
-        if done[first] {
-            continue;
-        }
-        let mut block = vec![first];
-        let mut next = 0;
-        while let Some(&row) = block.get(next) {
-            for column in 0..6 {
-                let coupled =
-                    matrix[(row, column)] != Complex::new(0.0, 0.0) || matrix[(column, row)] != Complex::new(0.0, 0.0);
-                if coupled && !block.contains(&column) {
-                    block.push(column);
-                }
-            }
-            next += 1;
-        }
-        block.iter().for_each(|&mode| done[mode] = true);
-        let at = |i: usize, j: usize| matrix[(block[i], block[j])];
-        let values: Vec<Complex<f64>> = match block.len() {
-            1 => vec![at(0, 0)],
-            2 => {
-                let (half, product) = ((at(0, 0) + at(1, 1)) * 0.5, at(0, 0) * at(1, 1) - at(0, 1) * at(1, 0));
-                let root = root(half * half - product);
-                vec![half + root, half - root]
-            }
-            size => nalgebra::DMatrix::from_fn(size, size, at)
-                .schur()
-                .eigenvalues()
-                .map_or_else(Vec::new, |values| values.iter().copied().collect()),
-        };
-        for (mode, value) in block.iter().zip(values) {
-            found[*mode] = value;
-        }
-    }
-    found
-}
-
-/// The root with a real part that is not negative.
-fn root(value: Complex<f64>) -> Complex<f64> {
-    let size = libm::sqrt(libm::hypot(value.re, value.im));
-    let half = 0.5 * libm::atan2(value.im, value.re);
-    Complex::new(size * libm::cos(half), size * libm::sin(half))
 }
 
 /// Hz of an angle ωT.

@@ -15,10 +15,11 @@ impl ClosedLoop {
     pub fn open_loop(&self, law: ControlMode, tuning: &Tuning, frequencies: &[f64]) -> [Vec<[f64; 2]>; 6] {
         let angles: Vec<f64> = frequencies.iter().map(|hertz| TAU * hertz * self.period).collect();
         let responses = self.modal_responses(&Conditions::NOMINAL, 1.0, &angles);
+        let controller = self.controller(law, tuning);
         let mut found: [Vec<[f64; 2]>; 6] = Default::default();
         for (modes, angle) in responses.iter().zip(angles) {
             // Modal, then along each axis: the diagonal of V L V⁻¹.
-            let modal = self.controller_at(law, tuning, angle) * self.plant_at(modes, angle);
+            let modal = controller(angle) * self.plant_at(modes, angle);
             for (axis, list) in found.iter_mut().enumerate() {
                 let mut value = Complex::new(0.0, 0.0);
                 for i in 0..6 {

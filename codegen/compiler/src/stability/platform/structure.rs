@@ -6,17 +6,17 @@
 //! every mode of the platform, is not judged by itself; simulations try it.
 
 use core::f64::consts::{PI, TAU};
+use std::sync::{Arc, Mutex, PoisonError};
 
-use nalgebra::Complex;
 use serde::Serialize;
 
-use super::channel::{ComplexMatrix, StructuralChannel};
+use super::channel::StructuralChannel;
 use super::closed_loop::{ClosedLoop, Conditions};
 use super::law::Tuning;
-use super::loop_gain::loci;
 use super::modes::ModalBasis;
 use specgen_language::model::{Model, StructuralKind, StructuralUncertainty};
 use specgen_numerics::nyquist::{Flexure, FlexureRange};
+use specgen_numerics::{ComplexMatrix, Loci};
 use specgen_runtime::ControlMode;
 
 /// Corners at which a loop must tolerate a mode, besides the nominal point: stiffness, relative lag of the amplifier, delay in ticks.
@@ -139,10 +139,10 @@ pub struct Corners {
     demand: StructureDemand,
     angles: Vec<f64>,
     plants: Vec<Vec<ComplexMatrix>>,
+    /// Of each control mode, the tuning of the last call of [`Corners::loci`] and its result: tuning rule, check and margins ask for
+    /// the same.
+    last: Arc<Mutex<Vec<(ControlMode, Tuning, Arc<Loci>)>>>,
 }
-
-/// Eigenvalues of the open loop of a control mode, each with its frequency in Hz, at every corner.
-pub(super) struct Loci(Vec<(f64, Complex<f64>)>);
 
 impl Corners {
     /// Those of a loop, with what it must tolerate.
@@ -154,7 +154,7 @@ impl Corners {
             modes.iter().zip(&angles).map(|(modes, angle)| of.plant_at(modes, *angle)).collect()
         });
         let plants = plants.collect();
-        Self { of, demand, angles, plants }
+        Self { of, demand, angles, plants, last: Arc::default() }
     }
 
     /// The loop.
@@ -167,19 +167,25 @@ impl Corners {
         &self.demand
     }
 
-    pub(super) fn loci(&self, law: ControlMode, tuning: &Tuning) -> Loci {
-        let mut found = Vec::new();
+    pub(super) fn loci(&self, law: ControlMode, tuning: &Tuning) -> Arc<Loci> {
+        let last = || self.last.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((.., loci)) = last().iter().find(|(of, with, _)| *of == law && with == tuning) {
+            return loci.clone();
+        }
+        let mut found = Loci::default();
+        let controller = self.of.controller(law, tuning);
         for (k, &angle) in self.angles.iter().enumerate() {
-            let controller = self.of.controller_at(law, tuning, angle);
+            let controller = controller(angle);
             let frequency = super::loop_gain::hertz(angle, self.of.period);
             for (corner, plants) in self.plants.iter().enumerate() {
-                let ratios: &[f64] = if corner == 0 { &[1.0] } else { &RATIO };
-                for value in loci(&(plants[k] * controller)) {
-                    found.extend(ratios.iter().map(|ratio| (frequency, value * *ratio)));
-                }
+                found.include(frequency, &plants[k], &controller, if corner == 0 { &[1.0] } else { &RATIO });
             }
         }
-        Loci(found)
+        let found = Arc::new(found);
+        let mut last = last();
+        last.retain(|(of, ..)| *of != law);
+        last.push((law, *tuning, found.clone()));
+        found
     }
 
     /// The damping ratio that a mode of the range needs at most.
@@ -221,31 +227,12 @@ impl Corners {
     }
 
     /// The border of a control mode for one more structural mode.
-    pub(super) fn border(&self, Loci(loci): &Loci, flexure: Flexure) -> Border {
+    pub(super) fn border(&self, loci: &Loci, flexure: Flexure) -> Border {
         let lowest = self.of.basis.frequencies[0] / TAU;
         let highest = 0.5 / self.of.period;
         let at = |bin: usize| lowest * libm::pow(highest / lowest, bin as f64 / (BINS - 1) as f64);
-        let mut border = Border {
-            kind: kind_of(flexure),
-            frequencies: (0..BINS).map(at).collect(),
-            damping_ratios: vec![0.0; BINS],
-        };
-        for (frequency, value) in loci {
-            let Some([factor, damping]) = flexure.border([value.re, value.im], [0.0; 2]) else { continue };
-            border.include(factor * frequency, damping);
-        }
-        border
-    }
-}
-
-impl Loci {
-    /// Of the modes from one frequency to another (Hz), the one that needs the most damping: its frequency, Hz, and ζ.
-    pub(super) fn demanded(&self, flexure: Flexure, [from, to]: [f64; 2]) -> [f64; 2] {
-        let needed = self.0.iter().filter_map(|(frequency, value)| {
-            let [factor, damping] = flexure.border([value.re, value.im], [0.0; 2])?;
-            (from..=to).contains(&(factor * frequency)).then_some([factor * frequency, damping])
-        });
-        needed.fold([from, 0.0], |most, one| if one[1] > most[1] { one } else { most })
+        let frequencies: Vec<f64> = (0..BINS).map(at).collect();
+        Border { kind: kind_of(flexure), damping_ratios: loci.border(flexure, &frequencies), frequencies }
     }
 }
 
@@ -259,15 +246,6 @@ fn kind_of(flexure: Flexure) -> &'static str {
 }
 
 impl Border {
-    fn include(&mut self, frequency: f64, damping: f64) {
-        let Some(last) = self.frequencies.iter().rposition(|one| *one <= frequency) else { return };
-        if let Some(ratio) = self.damping_ratios.get_mut(last)
-            && damping > *ratio
-        {
-            *ratio = damping;
-        }
-    }
-
     /// ζ at a frequency, Hz, and about it; zero above the highest, which no tick sees.
     pub(super) fn at(&self, frequency: f64) -> f64 {
         let Some(next) = self.frequencies.iter().position(|one| *one > frequency) else { return 0.0 };
