@@ -80,9 +80,9 @@ pub fn length<T>(short: T, long: T) -> T {
 pub fn active_damping() -> String {
     let text = fs::read_to_string(repository().join("specs/features/platform-damping.toml")).expect("a spec");
     let (_, design) = text.split_once("[control.design]\n").expect("a stored design");
-    let keys = design.lines().map(|line| match line.starts_with(char::is_alphabetic) {
-        true => format!("\ndesign.{line}"),
-        false => format!("\n{line}"),
+    let keys = design.lines().map(|line| {
+        let table = if line.starts_with(char::is_alphabetic) { "design." } else { "" };
+        format!("\n{table}{line}")
     });
     std::iter::once("active_damping = true".to_owned()).chain(keys).collect()
 }

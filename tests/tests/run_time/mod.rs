@@ -340,7 +340,7 @@ const PARTS: (&str, &str) = (
 fn a_platform_with_every_part_of_the_law_has_the_bits_of_the_emitted_one() {
     let damping = specgen_tests::active_damping();
     let parts = format!("[control]\nhand_over = true\ncorrection = \"2 um\"\n{damping}");
-    alike("parts-f32", "features/triggers.toml", &[("[control]", &parts)]);
+    alike("parts-f32", "features/triggers.toml", &[("[control]", parts.as_str())]);
 }
 
 #[test]

@@ -132,6 +132,8 @@ impl UnstableMode {
     }
 }
 
+type LastLoci = Vec<(ControlMode, Tuning, Arc<Loci>)>;
+
 /// The plant at every corner and frequency, which all control modes share.
 #[derive(Debug, Clone)]
 pub struct Corners {
@@ -141,7 +143,7 @@ pub struct Corners {
     plants: Vec<Vec<ComplexMatrix>>,
     /// Of each control mode, the tuning of the last call of [`Corners::loci`] and its result: tuning rule, check and margins ask for
     /// the same.
-    last: Arc<Mutex<Vec<(ControlMode, Tuning, Arc<Loci>)>>>,
+    last: Arc<Mutex<LastLoci>>,
 }
 
 impl Corners {
