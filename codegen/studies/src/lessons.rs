@@ -328,10 +328,12 @@ fn help(options: &Options, study: &Study, learned: &LearningResult) -> Vec<Strin
     let left = learned.passes[learned.best].measured_nm;
     let stopped = matches!(learned.ending, Ending::Growth | Ending::NoGain);
     let expected = learned.expected_nm.filter(|expected| *expected < WORTH * left);
-    if let Some(expected) = expected.filter(|_| !convergence.measured && (stopped || highest < options.bandwidth)) {
+    let reach = convergence.reach();
+    if let Some(expected) = expected.filter(|_| !convergence.measured && (stopped || highest < reach)) {
+        let wider = if reach > options.bandwidth { format!(" --bandwidth {reach}") } else { String::new() };
         help.push(format!(
-            "measure the response with --excite FILE, then learn with --response FILE: about {expected:.1} nm by the gauges instead of \
-             {left:.1}"
+            "measure the response with --excite FILE{wider}, then learn with --response FILE{wider}: about {expected:.1} nm by the gauges \
+             instead of {left:.1}"
         ));
     }
     help

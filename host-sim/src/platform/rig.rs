@@ -127,6 +127,13 @@ impl PlatformRig {
         self.jitter.draw_ahead(ticks);
     }
 
+    /// Period of the mains in the gauges, s; none without mains.
+    #[must_use]
+    pub fn mains_period(&self) -> Option<f64> {
+        let mains = self.imperfections.as_ref()?.mains.iter().find(|one| one.amplitude_m > 0.0)?;
+        (mains.frequency_hz > 0.0).then(|| 1.0 / mains.frequency_hz)
+    }
+
     /// The plant.
     #[must_use]
     pub fn plant(&self) -> &PlatformPlant {

@@ -5,7 +5,10 @@ use std::f64::consts::TAU;
 use serde::Serialize;
 use specgen_compiler::compile::Compilation;
 use specgen_compiler::lower;
-use specgen_compiler::stability::platform::{ClosedLoop, Conditions, RestDynamics, Tuning};
+use specgen_compiler::stability::platform::{
+    ClosedLoop, Conditions, RestDynamics, StructuralChannel, StructureDemand, Tuning,
+};
+use specgen_numerics::nyquist::{Complex, Flexure, over, plus, square, times};
 use specgen_runtime::{ControlMode, Law};
 
 use super::matrix::{Matrix6c, inverse, larger, left, multiply, norm, spectral_radius};
@@ -19,7 +22,13 @@ const ORDERS: [f64; 2] = [8.0, 4.0];
 /// A correction is not learned where the loop passes less of it than this: there the feedback suffices.
 const LEAST_LEFT: f64 = 0.004;
 /// Candidate shares of the inverse: a smaller share learns more slowly, but tolerates more uncertainty.
-const SHARES: [f64; 7] = [1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4];
+const SHARES: [f64; 11] = [1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.2, 0.1, 0.0];
+/// Ratio of the natural frequencies of unknown structural modes that are tried one after the other, and up to which multiple of a frequency.
+const FINELY: f64 = 1.005;
+const ABOVE: f64 = 2.0;
+/// Bandwidth to learn such modes with a measured T, relative to f0, and what it is a multiple of, Hz.
+const BEYOND: f64 = 1.5;
+const ROUNDED: f64 = 50.0;
 /// Knots per period of f_c.
 const KNOTS: f64 = 3.5;
 /// Factor on the highest frequency, beyond which nothing is learned.
@@ -43,6 +52,8 @@ pub struct Learnable {
     pub(super) lead: f64,
     /// Measured T of the machine, if any.
     measured: Option<Response>,
+    /// Structural modes that the machine may have.
+    unknown: StructureDemand,
 }
 
 /// Result of the convergence analysis for every machine within the intervals.
@@ -62,6 +73,12 @@ pub struct Convergence {
     /// Lowest frequency of the measured T, Hz; infinite if none was measured.
     #[serde(skip)]
     pub(super) edge: f64,
+    /// Delay of the T that is inverted, ticks: the middle of its interval, so that no machine is further from it than necessary.
+    #[serde(skip)]
+    pub(super) delay: f64,
+    /// Lowest frequency of an unknown structural mode, Hz.
+    #[serde(skip)]
+    pub(super) unknown_from: f64,
     /// The bound without Q at frequencies (Hz) in ascending order.
     #[serde(skip)]
     pub bounds: Vec<[f64; 2]>,
@@ -112,6 +129,8 @@ impl Convergence {
             measured: true,
             wish,
             edge: low,
+            delay: 0.0,
+            unknown_from: 0.0,
             bounds: Vec::new(),
             shares,
         };
@@ -136,9 +155,17 @@ impl Convergence {
         passed(self.band, hertz)
     }
 
-    /// |Q| at a frequency (Hz) if learning reached the requested one.
+    /// Frequency (Hz) up to which learning with a measured T is worth trying: the requested one, or beyond the unknown structural modes that
+    /// ring first.
+    #[must_use]
+    pub fn reach(&self) -> f64 {
+        let beyond = ROUNDED * libm::ceil(BEYOND * self.unknown_from / ROUNDED);
+        if beyond > self.wish { beyond } else { self.wish }
+    }
+
+    /// |Q| at a frequency (Hz) if learning reached [`Self::reach`].
     pub(super) fn wished(&self, hertz: f64) -> f64 {
-        passed([self.band[0], self.wish], hertz)
+        passed([self.band[0], self.reach()], hertz)
     }
 
     /// The share of T⁻¹ used at a frequency, Hz.
@@ -160,7 +187,8 @@ impl Learnable {
         let design = compiled.design.as_ref()?;
         let closed_loop = design.closed_loop(model, task, &RestDynamics::of(&lower::platform(model).ok()?))?;
         let (law, tuning) = design.law(model, task);
-        Some(Self { closed_loop, law, tuning: *tuning, lead: design.lead, measured: None })
+        let unknown = StructureDemand::of(model, &closed_loop.basis);
+        Some(Self { closed_loop, law, tuning: *tuning, lead: design.lead, measured: None, unknown })
     }
 
     pub(crate) fn closed_loop(&self) -> &ClosedLoop {
@@ -205,18 +233,23 @@ impl Learnable {
     /// G: the response without feedback.
     pub(super) fn open_loop(&self, frequencies: &[f64]) -> Vec<Matrix6c> {
         let law = ControlMode::F(Law::Invhys);
-        let open = Self { closed_loop: self.closed_loop.clone(), law, tuning: Tuning::NONE, lead: 0.0, measured: None };
+        let open = Self { law, tuning: Tuning::NONE, lead: 0.0, measured: None, ..self.clone() };
         open.nominal(frequencies)
     }
 
-    /// The T used for learning at frequencies (Hz) in ascending order: the model's below `edge`, the measured one above.
-    pub(super) fn known(&self, frequencies: &[f64], edge: f64) -> Vec<Matrix6c> {
-        let slower = frequencies.partition_point(|hertz| *hertz < edge);
-        let mut all = self.nominal(&frequencies[..slower]);
+    /// The T used for learning at frequencies (Hz) in ascending order: the model's below the edge, the measured one above.
+    pub(super) fn known(&self, frequencies: &[f64], convergence: &Convergence) -> Vec<Matrix6c> {
+        let slower = frequencies.partition_point(|hertz| *hertz < convergence.edge);
+        let mut all = self.expected(&frequencies[..slower], convergence.delay);
         let measured =
             self.measured.iter().flat_map(|response| frequencies[slower..].iter().map(|hertz| response.at(*hertz)));
         all.extend(measured);
         all
+    }
+
+    /// T by the compiler's model, with a delay in ticks.
+    pub(super) fn expected(&self, frequencies: &[f64], delay: f64) -> Vec<Matrix6c> {
+        self.response(&self.closed_loop, &late(delay), frequencies)
     }
 
     /// T by the compiler's model.
@@ -249,6 +282,8 @@ impl Learnable {
             measured: false,
             wish,
             edge: f64::INFINITY,
+            delay: middle(factors),
+            unknown_from: self.unknown.from,
             bounds: Vec::new(),
             shares,
         };
@@ -260,7 +295,7 @@ impl Learnable {
 
     /// Extends a measured band downwards with the model's T and the machines within `factors`: a sweep during a pass tells little about
     /// slow motion, most of which the feedback suppresses, and there mass and stiffness hardly matter.
-    fn slower(&self, found: Convergence, factors: &Factors, wish: f64) -> Convergence {
+    fn slower(&self, mut found: Convergence, factors: &Factors, wish: f64) -> Convergence {
         let frequencies: Vec<f64> = self.grid(wish).into_iter().filter(|hertz| *hertz < found.edge).collect();
         let (inverses, shares, radii) = self.modelled(&frequencies, factors);
         let learned = |k: &usize| radii[*k] <= LARGEST_RADIUS && norm(&inverses[*k]) * LEAST_LEFT <= 1.0;
@@ -271,9 +306,17 @@ impl Learnable {
         let fast = found.shares.iter().copied().filter(|[hertz, _]| *hertz >= found.edge);
         let band = [if first == 0 { 0.0 } else { frequencies[first] }, found.band[1]];
         let shares = slow.chain(fast).collect();
-        let (edge, bounds) = (found.edge, found.bounds);
-        let mut whole =
-            Convergence { band, radius: 0.0, at: 0.0, measured: true, wish, edge, bounds: Vec::new(), shares };
+        let edge = found.edge;
+        let bounds = std::mem::take(&mut found.bounds);
+        let mut whole = Convergence {
+            band,
+            radius: 0.0,
+            at: 0.0,
+            bounds: Vec::new(),
+            shares,
+            delay: middle(factors),
+            ..found
+        };
         for (hertz, radius) in frequencies.iter().zip(&radii) {
             whole.meet(*hertz, *radius);
         }
@@ -285,8 +328,9 @@ impl Learnable {
 
     /// By the model, at each frequency (Hz): T⁻¹, the share of it used, and the largest radius over the machines within `factors`.
     fn modelled(&self, frequencies: &[f64], factors: &Factors) -> (Vec<Matrix6c>, Vec<f64>, Vec<f64>) {
-        let inverses: Vec<Matrix6c> = self.nominal(frequencies).iter().map(inverse).collect();
-        let mut radii = vec![[0.0; SHARES.len()]; frequencies.len()];
+        let delay = middle(factors);
+        let inverses: Vec<Matrix6c> = self.expected(frequencies, delay).iter().map(inverse).collect();
+        let mut radii = self.with_unknown_modes(frequencies, delay);
         for (closed_loop, conditions) in self.machines(factors) {
             let real = self.response(&closed_loop, &conditions, frequencies);
             for ((radii, real), inverse) in radii.iter_mut().zip(&real).zip(&inverses) {
@@ -304,6 +348,44 @@ impl Learnable {
         });
         let (shares, radii) = chosen.unzip();
         (inverses, shares, radii)
+    }
+
+    /// At each frequency (Hz) and for each share α of T⁻¹, the largest |1 − α F (1 + L)/(1 + F L)| over the structural modes that the
+    /// spec permits: F is their factor on the plant, and L an eigenvalue of the open loop.
+    fn with_unknown_modes(&self, frequencies: &[f64], delay: f64) -> Vec<[f64; SHARES.len()]> {
+        let StructureDemand { from, damping_ratio, flexures, suspects } = &self.unknown;
+        let angles: Vec<f64> = frequencies.iter().map(|hertz| TAU * hertz * self.closed_loop.period).collect();
+        let loops = self.closed_loop.loci(self.law, &self.tuning, &late(delay), &angles);
+        let at = |(hertz, loops): (&f64, [Complex; 6])| {
+            let natural = std::iter::successors(Some(*from), |last| Some(last * FINELY));
+            let natural = natural.take_while(|one| one <= from || *one <= ABOVE * hertz);
+            let factor = |one: f64| flexures.iter().map(move |flexure| flexure.factor(hertz / one, *damping_ratio));
+            let unknown = natural.flat_map(factor);
+            let known = suspects.iter().map(|one| one.flexure.factor(TAU * hertz / one.frequency, one.damping_ratio));
+            let mut radii = [0.0; SHARES.len()];
+            for factor in unknown.chain(known) {
+                for open in loops {
+                    let grown = over(times(factor, plus([1.0, 0.0], open)), plus([1.0, 0.0], times(factor, open)));
+                    for (radius, share) in radii.iter_mut().zip(SHARES) {
+                        *radius = larger(*radius, libm::sqrt(square([1.0 - share * grown[0], -share * grown[1]])));
+                    }
+                }
+            }
+            radii
+        };
+        frequencies.iter().zip(loops).map(at).collect()
+    }
+
+    /// The nominal machine with one unknown structural mode of each kind, at the lowest frequency that the spec permits.
+    pub(super) fn with_a_mode(&self, factors: &Factors) -> Vec<(ClosedLoop, Conditions)> {
+        let StructureDemand { from, damping_ratio, flexures, .. } = &self.unknown;
+        let machine = |flexure: &Flexure| {
+            let (frequency, damping_ratio) = (TAU * from, *damping_ratio);
+            let mut closed_loop = self.closed_loop.clone();
+            closed_loop.structure.push(StructuralChannel { flexure: *flexure, frequency, damping_ratio, place: None });
+            (closed_loop, late(middle(factors)))
+        };
+        flexures.iter().map(machine).collect()
     }
 
     /// Frequencies up to where Q passes nothing, in ascending order, densest around the modes.
@@ -344,6 +426,17 @@ impl Learnable {
         }
         all
     }
+}
+
+/// The middle of the interval of the delay, ticks.
+fn middle(factors: &Factors) -> f64 {
+    let [low, high] = factors.range(Factor::DelayTicks);
+    0.5 * (low + high)
+}
+
+/// The nominal machine with a delay in ticks.
+fn late(delay: f64) -> Conditions {
+    Conditions { delay, ..Conditions::NOMINAL }
 }
 
 /// The highest f_c up to `wish` (Hz) whose Q keeps the radius at each frequency (Hz) below the largest permitted; `None` if a radius is NaN.

@@ -218,6 +218,7 @@ impl RepeatableMachine for Bench<'_> {
         debug_assert!(known, "{course:?}");
         let mut real = Vec::with_capacity(motion.targets.len());
         let mut status = 0;
+        self.lose_mains_phase(motion.targets[0])?;
         for target in &motion.targets {
             let correction = player.give().map_or([0.0; 6], |given| given.correction);
             let done = self.tick(&Request { correction, ..Request::stream(*target) })?;
@@ -312,7 +313,7 @@ pub struct LearningResult {
     pub knots: Vec<Knot>,
     /// Difference of two passes under the same correction in [`Pass::measured_nm`], nm; `None` if there was nothing to learn from.
     pub noise_nm: Option<f64>,
-    /// [`Pass::measured_nm`] that learning with the machine's own response, up to the requested frequency, would leave of the first pass,
+    /// [`Pass::measured_nm`] that learning with the machine's own response, up to [`super::Convergence::reach`], would leave of the first pass,
     /// nm; `None` if the device learns.
     pub expected_nm: Option<f64>,
     /// If a correction was limited: the limit (`control.correction`) that the first one needs, with headroom, nm.
@@ -362,7 +363,7 @@ pub fn learn(
         knots: played.clone(),
         noise_nm: session.as_ref().map(|(judge, _)| judge.noise_nm()),
         expected_nm: session.as_ref().and_then(|(_, session)| session.expected_nm(&seen, motion)),
-        sufficient_nm: None,
+        sufficient_nm: first.limited().then(|| 1e9 * sufficient(begin, motion, spacing)),
         ending: Ending::AllPasses,
     };
     let mut number = 0;

@@ -67,7 +67,8 @@ impl Plan {
         capacity: usize,
     ) -> Option<Self> {
         let period = learnable.closed_loop.period;
-        let machines = learnable.machines(factors);
+        let mut machines = learnable.machines(factors);
+        machines.extend(learnable.with_a_mode(factors));
         let mut wish = convergence.clone();
         while wish.band[1] >= LEAST {
             let spacing = wish.spacing(period);
@@ -148,7 +149,7 @@ impl Grid {
     fn taps(&self, learnable: &Learnable, wish: &Convergence) -> Taps {
         let length = (2 * FINE * self.reach).next_power_of_two();
         let hertz: Vec<f64> = (1..=length / 2).map(|bin| bin as f64 / (length as f64 * self.apart())).collect();
-        let responses = learnable.nominal(&hertz);
+        let responses = learnable.expected(&hertz, wish.delay);
         let mut spectra = vec![vec![Complex64::default(); length]; 7];
         for (bin, (response, hertz)) in (1..).zip(responses.iter().zip(&hertz)) {
             let passed = wish.passed(*hertz);

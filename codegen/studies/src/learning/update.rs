@@ -18,7 +18,7 @@ pub(super) const FADE: [f64; 2] = [5e-3, 20e-3];
 pub struct Update {
     /// L and Q at the frequencies that Q passes.
     bins: Vec<(Matrix6c, f64)>,
-    /// Q at the frequencies that it passes if learning reaches the requested one.
+    /// Q at the frequencies that it passes if learning reaches [`Convergence::reach`].
     wished: Vec<f64>,
     to_modal: Matrix6,
     from_modal: Matrix6,
@@ -37,7 +37,7 @@ impl Update {
     pub fn new(learnable: &Learnable, motion: &Motion, convergence: &Convergence, spacing: u32) -> Self {
         let width = f64::from(spacing) * learnable.closed_loop.period;
         let mut update = Self::of(learnable, motion, convergence.band[1], spacing, |frequencies| {
-            let responses = learnable.known(frequencies, convergence.edge);
+            let responses = learnable.known(frequencies, convergence);
             responses
                 .iter()
                 .zip(frequencies)
@@ -52,7 +52,7 @@ impl Update {
                 })
                 .collect()
         });
-        let hertz = frequencies(update.length, convergence.wish, learnable.closed_loop.period);
+        let hertz = frequencies(update.length, convergence.reach(), learnable.closed_loop.period);
         update.wished = hertz.into_iter().map(|hertz| convergence.wished(hertz)).collect();
         update
     }
@@ -134,7 +134,7 @@ impl Update {
     }
 
     /// The error (tick by tick, m and rad) that would remain of this one if learning converged with the machine's own response, up to
-    /// the requested frequency: what Q does not pass, and what does not repeat.
+    /// [`Convergence::reach`]: what Q does not pass, and what does not repeat.
     pub(super) fn remainder(&self, error: &[[f64; 6]], coherence: &Coherence) -> Vec<[f64; 6]> {
         let mut missed = self.spectra(error);
         let repeated = coherence.repeated(&missed, self.noise(error));
@@ -355,9 +355,11 @@ mod tests {
         }
     }
 
-    /// A machine whose gauges show its correction as it is, with mains on each of them, m, which a pass meets at any phase.
+    /// A machine whose gauges show its correction as it is, with mains on each of them, m, which a pass meets at any phase. It reports a
+    /// correction above its limit, m, as limited.
     struct Humming {
         mains: f64,
+        limit: f64,
         passes: usize,
     }
 
@@ -386,11 +388,13 @@ mod tests {
                 std::array::from_fn(|axis| part.iter().map(|error| error[axis]).sum::<f64>() / part.len() as f64)
             };
             let measured = error.chunks(width).flat_map(|part| std::iter::repeat_n(mean(part), part.len())).collect();
-            Ok(PassObservation { measured, real, kept: Vec::new(), status: 0 })
+            let most = (0..motion.corrected as u32).map(|tick| playback::at::<f64>(knots, spacing, tick)[0].abs());
+            let limited = most.fold(0.0, f64::max) > self.limit;
+            Ok(PassObservation { measured, real, kept: Vec::new(), status: u32::from(limited) << 20 })
         }
     }
 
-    fn learned(mains: f64, count: usize) -> LearningResult {
+    fn learned(mains: f64, begin: &[Knot], count: usize) -> LearningResult {
         let (learnable, factors) = reference();
         let motion = Motion::of(&PaperPose::corrected(PaperPath::Case1, 10.0), PERIOD, &SPEED, RADIUS).unwrap();
         let unity = std::array::from_fn(|i| std::array::from_fn(|j| [f64::from(i == j), 0.0]));
@@ -400,15 +404,33 @@ mod tests {
         let convergence = learnable.convergence(&factors, 800.0).unwrap();
         let spacing = convergence.spacing(PERIOD);
         let update = Update::new(&learnable, &motion, &convergence, spacing);
-        let mut machine = Humming { mains, passes: 0 };
+        let mut machine = Humming { mains, limit: 2e-6, passes: 0 };
         let go_on = |_: usize, _: &_| ControlFlow::Continue(());
-        learn(&mut machine, &motion, Learner::Host(&update), &[], spacing, count, go_on).unwrap()
+        learn(&mut machine, &motion, Learner::Host(&update), begin, spacing, count, go_on).unwrap()
+    }
+
+    /// A correction that is given and limited, with passes to learn from and without.
+    #[test]
+    fn a_limited_initial_correction_has_a_sufficient_limit() {
+        for (microns, limit) in [(1, None), (3, Some(3600.0))] {
+            let begin = vec![[microns * 1_000_000, 0, 0, 0, 0, 0]; 1000];
+            for count in [0, 1] {
+                let found = learned(0.0, &begin, count);
+                assert!(found.passes[0].limited() == limit.is_some(), "{found:?}");
+                let as_stated = match (found.sufficient_nm, limit) {
+                    (None, None) => true,
+                    (Some(found), Some(limit)) => (found / limit - 1.0).abs() < 1e-3,
+                    _ => false,
+                };
+                assert!(as_stated, "{microns} um, {count} passes: {found:?}");
+            }
+        }
     }
 
     /// What repeats is learned, and mains on the gauges, which does not, is not.
     #[test]
     fn mains_on_the_gauges_is_not_learned() {
-        let [bare, humming] = [0.0, 5e-9].map(|mains| learned(mains, 5));
+        let [bare, humming] = [0.0, 5e-9].map(|mains| learned(mains, &[], 5));
         let errors =
             |learned: &LearningResult| learned.passes.iter().map(|pass| pass.translation_nm).collect::<Vec<_>>();
         let expected = [&bare, &humming].map(|learned| learned.expected_nm.unwrap());

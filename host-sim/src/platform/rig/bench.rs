@@ -238,6 +238,23 @@ impl<'a> Bench<'a> {
         })
     }
 
+    /// Stays at a set-point for another part of a mains period each time, if the gauges have mains: no machine begins its motions in
+    /// step with them.
+    ///
+    /// # Errors
+    /// As [`Bench::tick`].
+    pub fn lose_mains_phase(&mut self, at: PoseTarget) -> Result<(), RunError> {
+        /// Inverse of the golden ratio: its multiples are spread evenly.
+        const SPREAD: f64 = 0.618_033_988_749_894_9;
+        let Some(period) = self.rig.mains_period() else { return Ok(()) };
+        let (whole, ticks) = (period / self.interval, self.ticks as f64);
+        let part = SPREAD * ticks - libm::floor(SPREAD * ticks);
+        for _ in 0..(part * whole) as usize {
+            self.tick(&Request::stream(at))?;
+        }
+        Ok(())
+    }
+
     /// Holds until the controller is at its bias pose, at most `limit` (s); returns the time, s.
     ///
     /// # Errors

@@ -106,6 +106,22 @@ impl ClosedLoop {
         angles.iter().map(|&angle| core::array::from_fn(|mode| of(mode, angle))).collect()
     }
 
+    /// Eigenvalues of the open loop, as (real, imaginary), at the angles ωT. Contact and λ are left out.
+    #[must_use]
+    pub fn loci(
+        &self,
+        law: ControlMode,
+        tuning: &Tuning,
+        conditions: &Conditions,
+        angles: &[f64],
+    ) -> Vec<[[f64; 2]; 6]> {
+        let modes = self.modal_responses(conditions, 1.0, angles);
+        let at = |(modes, &angle): (&[Complex<f64>; 6], &f64)| {
+            loci(&(self.plant_at(modes, angle) * self.controller_at(law, tuning, angle))).map(|one| [one.re, one.im])
+        };
+        modes.iter().zip(angles).map(at).collect()
+    }
+
     /// P at the angle ωT from the response of each mode there.
     pub(super) fn plant_at(&self, modes: &[Complex<f64>; 6], angle: f64) -> ComplexMatrix {
         let frequency = angle / self.period;
