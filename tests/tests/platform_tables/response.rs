@@ -136,7 +136,8 @@ fn a_leg_mode_that_nobody_knows_is_learned_with_a_measured_response() {
         let found = in_parallel(MODES.len() as u32, |which| {
             let mut specimen = bench.specimen.clone();
             let frequency_hz = MODES[which as usize];
-            let mode = StructuralMode { place: ModePlace::Leg(None), frequency_hz, damping_ratio: 0.01, participation: None };
+            let mode =
+                StructuralMode { place: ModePlace::Leg(None), frequency_hz, damping_ratio: 0.01, participation: None };
             specimen.nominal.imperfections.modes.push(mode);
             session(bench, &scenario(&specimen), |machine| {
                 let response = measured(machine, &model, reach);
@@ -147,7 +148,10 @@ fn a_leg_mode_that_nobody_knows_is_learned_with_a_measured_response() {
         });
         for (hertz, ([low, high], learned)) in MODES.iter().zip(&found) {
             let errors: Vec<f64> = learned.passes.iter().map(|pass| pass.translation_nm).collect();
-            println!("{name}, leg {hertz:.0} Hz: measured {low:.1} to {high:.0} Hz, {errors:.1?} nm, best {}", learned.best);
+            println!(
+                "{name}, leg {hertz:.0} Hz: measured {low:.1} to {high:.0} Hz, {errors:.1?} nm, best {}",
+                learned.best
+            );
             assert!(!learned.grew() && errors[learned.best] <= 6.0, "{learned:?}");
         }
     }

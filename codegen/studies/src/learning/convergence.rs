@@ -23,6 +23,8 @@ const ORDERS: [f64; 2] = [8.0, 4.0];
 const LEAST_LEFT: f64 = 0.004;
 /// Candidate shares of the inverse: a smaller share learns more slowly, but tolerates more uncertainty.
 const SHARES: [f64; 11] = [1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.2, 0.1, 0.0];
+/// Share of the inverse of a measured T: legs with hysteresis answer a sweep and a correction of another size differently.
+const MEASURED: f64 = 0.7;
 /// Ratio of the natural frequencies of unknown structural modes that are tried one after the other, and up to which multiple of a frequency.
 const FINELY: f64 = 1.005;
 const ABOVE: f64 = 2.0;
@@ -98,7 +100,7 @@ impl Convergence {
     /// measurement, up to `wish` (Hz); `None` if there is none.
     fn measured(response: &Response, wish: f64) -> Option<Self> {
         let bins = &response.bins;
-        let radii: Vec<f64> = bins.iter().map(Bin::doubt).collect();
+        let radii: Vec<f64> = bins.iter().map(|bin| 1.0 - MEASURED + MEASURED * bin.doubt()).collect();
         let inside = |k: &usize| bins[*k].hertz <= wish;
         let best = (0..radii.len()).filter(inside).min_by(|a, b| radii[*a].total_cmp(&radii[*b]))?;
         // NaN counts as not converging.
@@ -120,7 +122,8 @@ impl Convergence {
             return None;
         }
         let mut shares: Vec<[f64; 2]> = vec![[0.0, 0.0]];
-        shares.extend(bins.iter().enumerate().map(|(k, bin)| [bin.hertz, f64::from(u8::from(learned(k)))]));
+        let share = |k: usize| if learned(k) { MEASURED } else { 0.0 };
+        shares.extend(bins.iter().enumerate().map(|(k, bin)| [bin.hertz, share(k)]));
         shares.push([JUST_BEYOND * end[0], 0.0]);
         let mut found = Self {
             band: [low, high],
@@ -308,15 +311,8 @@ impl Learnable {
         let shares = slow.chain(fast).collect();
         let edge = found.edge;
         let bounds = std::mem::take(&mut found.bounds);
-        let mut whole = Convergence {
-            band,
-            radius: 0.0,
-            at: 0.0,
-            bounds: Vec::new(),
-            shares,
-            delay: middle(factors),
-            ..found
-        };
+        let mut whole =
+            Convergence { band, radius: 0.0, at: 0.0, bounds: Vec::new(), shares, delay: middle(factors), ..found };
         for (hertz, radius) in frequencies.iter().zip(&radii) {
             whole.meet(*hertz, *radius);
         }
