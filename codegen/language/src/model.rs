@@ -187,10 +187,7 @@ impl Model {
             structural_modes: (0..fields.count("mode"))
                 .map(|index| StructuralMode::read(fields, &format!("mode[{index}]")))
                 .collect::<Option<_>>()?,
-            structure: match fields.table("robust.structure") {
-                Some(_) => StructuralUncertainty::read(fields, "robust.structure")?,
-                None => StructuralUncertainty::assumed(),
-            },
+            structure: StructuralUncertainty::read(fields, "robust.structure")?,
             lint: Lint::read(fields, "lint").unwrap_or(Lint { allow: Vec::new() }),
             spans: fields.spans(),
         })

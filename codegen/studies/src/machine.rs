@@ -19,7 +19,7 @@ use serde::{Deserialize, Serialize};
 
 use specgen_compiler::compile::Compilation;
 use specgen_language::files;
-use specgen_language::model::{self as language, Model, StructuralKind, StructuralUncertainty, TaskSpace};
+use specgen_language::model::{self as language, Model, StructuralKind, TaskSpace};
 use specgen_language::outcome::Failure;
 
 /// Gain of the reference leg's controller, 5 × 0.1262 µm/V, to which its measured gain is related, m/V.
@@ -232,7 +232,7 @@ impl StructureRange {
     pub fn of(model: &Model, machine: &Specimen) -> Self {
         let declared = &model.structure;
         let lowest = machine.structure().modes().0[0] / core::f64::consts::TAU;
-        let from_hz = declared.from.unwrap_or(StructuralUncertainty::FROM * lowest);
+        let from_hz = declared.from_hz(lowest);
         let kind = |kind: &StructuralKind| match kind {
             StructuralKind::Leg => (ModePlace::Leg(None), None),
             StructuralKind::Gauge => (ModePlace::Gauge(None), Some(declared.gauge_participation)),

@@ -5,11 +5,10 @@ use crate::keys::declare::*;
 
 /// Largest damping ratio that the controller may rely on for a mode that is not known.
 const LARGEST_DAMPING: f64 = 0.3;
-/// Defaults of [`StructuralUncertainty`] and [`StructuralMode::participation`].
-const DAMPING: f64 = 0.01;
+/// Defaults of [`StructuralMode::participation`].
 const GAUGE: f64 = 0.5;
 const FRAME: f64 = -0.1;
-/// The same as in a spec.
+/// That of a frame in a spec.
 const FRAME_REACTION: &str = "-0.1";
 
 const FREQUENCY: Shape = one(Dimension::FREQUENCY, Range::closed(0.1, 1e7), "Hz");
@@ -71,7 +70,7 @@ pub(crate) fn place(fields: &Fields, table: &str) -> Option<(StructuralKind, Opt
 
 section! {
     /// Structural modes that the spec does not list. The controller must be stable with any single one of them: its frequency is at least `f0` and its damping ratio at least `damping_ratio`. A spec without this section is checked with the defaults. The factors are those of [[mode]].
-    "robust.structure" ["structural_uncertainty", "unmodelled"], Optional => StructuralUncertainty {
+    "robust.structure" ["structural_uncertainty", "unmodelled"], Plain => StructuralUncertainty {
         /// Lowest frequency of such a mode.
         f0 = FREQUENCY, Rule("2.5 times the lowest mode of the platform"), "" ["from", "frequency", "lowest"], "900 Hz";
         /// Smallest damping ratio of such a mode.
@@ -87,24 +86,15 @@ section! {
         /// Lowest frequency, Hz. None: 2.5 times the lowest mode of the platform.
         from: Option<f64> = fields.number(&join(table, "f0"));
         /// Whether the spec has the section.
-        given: bool = true;
+        given: bool = fields.table(table).is_some();
     }
 }
 
 impl StructuralUncertainty {
-    /// Lowest frequency of such a mode over that of the lowest mode of the platform, if the spec gives none.
-    pub const FROM: f64 = 2.5;
-
-    /// That of a spec without the section.
-    pub(super) fn assumed() -> Self {
-        Self {
-            damping_ratio: DAMPING,
-            kinds: vec![StructuralKind::Leg, StructuralKind::Gauge, StructuralKind::Frame],
-            gauge_participation: GAUGE,
-            frame_participation: FRAME,
-            from: None,
-            given: false,
-        }
+    /// Lowest frequency of such a mode, Hz, on a platform whose lowest mode is `lowest`, Hz.
+    #[must_use]
+    pub fn from_hz(&self, lowest: f64) -> f64 {
+        self.from.unwrap_or(2.5 * lowest)
     }
 }
 

@@ -110,7 +110,7 @@ section! {
     /// Variations for `specgen robust`: smallest and largest factor on values of other sections, and the largest permitted errors. The controller does not use them.
     ///
     /// Errors in m and rad; none if the spec has no limit.
-    "robust" ["uncertainty", "tolerances"], Optional => Robust {
+    "robust" ["uncertainty", "tolerances"], Plain => Robust {
         /// On mass and inertia of the platform.
         mass: Option<[f64; 2]> = FACTORS, Rule("[0.95, 1.05]"), "", [0.95, 1.05];
         /// On the axial stiffness of a leg.

@@ -14,7 +14,7 @@ use super::channel::StructuralChannel;
 use super::closed_loop::{ClosedLoop, Conditions};
 use super::law::Tuning;
 use super::modes::ModalBasis;
-use specgen_language::model::{Model, StructuralKind, StructuralUncertainty};
+use specgen_language::model::{Model, StructuralKind};
 use specgen_numerics::nyquist::{Flexure, FlexureRange};
 use specgen_numerics::{ComplexMatrix, Loci};
 use specgen_runtime::ControlMode;
@@ -75,7 +75,7 @@ impl StructureDemand {
             StructuralKind::Frame => Flexure::Sensor(declared.frame_participation),
         };
         Self {
-            from: declared.from.unwrap_or(StructuralUncertainty::FROM * basis.frequencies[0] / TAU),
+            from: declared.from_hz(basis.frequencies[0] / TAU),
             damping_ratio: declared.damping_ratio,
             flexures: declared.kinds.iter().map(flexure).collect(),
             suspects: vec![StructuralChannel {
