@@ -155,6 +155,24 @@ fn the_report_of_a_platform_judges_errors_by_their_limits() {
         &page,
         &["14 assumed values, simulated leg record", "noise at rest in θ", "E0347", "<table>", "not measured: 14"],
     );
+    // The border of structural modes: a line for each kind, none of which enters the declared range.
+    let border = page.split("\"border\":").nth(1).unwrap();
+    let border = serde_json::Deserializer::from_str(border).into_iter::<serde_json::Value>().next().unwrap().unwrap();
+    let series = border["series"].as_array().unwrap();
+    let names: Vec<&str> = series.iter().map(|one| one["name"].as_str().unwrap()).collect();
+    assert_eq!(names, ["leg", "gauge", "frame", "least of the declared range"]);
+    let numbers = |one: usize, axis: &str| -> Vec<f64> { serde_json::from_value(series[one][axis].clone()).unwrap() };
+    let (declared, least) = (numbers(3, "x"), numbers(3, "y"));
+    assert!(
+        declared[0] == declared[1] && declared[2] == 5000.0 && least == [1.0, 0.01, 0.01],
+        "{declared:?} {least:?}"
+    );
+    for kind in 0..3 {
+        let (x, y) = (numbers(kind, "x"), numbers(kind, "y"));
+        let mut within = x.windows(2).zip(&y).filter(|(x, _)| x[0] >= declared[0] && x[1] > x[0]);
+        assert!(within.all(|(_, ratio)| *ratio <= 0.01), "{}", names[kind]);
+        assert!(y.iter().any(|ratio| *ratio > 0.01), "{}", names[kind]);
+    }
     let table = page.split("<caption>Errors on trajectories, rms</caption>").nth(1).unwrap();
     for (name, word) in [
         ("case-1 1 Hz xyz", "within limit"),

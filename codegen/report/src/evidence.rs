@@ -62,6 +62,7 @@ pub fn control_modes(design: &Design) -> Grid {
             "delay margin, ticks",
             "slowest time constant, ms",
             "least damped mode",
+            "structural modes need ζ",
         ],
     );
     for one in &design.margins {
@@ -74,6 +75,7 @@ pub fn control_modes(design: &Design) -> Grid {
             or(one.delay_margin_ticks, "> 5"),
             or(one.settling.map(|time| time * 1e3), "no feedback"),
             least.map_or_else(String::new, |mode| format!("{:.0} Hz, ζ {:.4}", mode.frequency, mode.damping_ratio)),
+            digits(one.structure_damping),
         ]);
     }
     table

@@ -5,12 +5,12 @@ use core::f64::consts::TAU;
 use serde_json::{Value, json};
 use specgen_compiler::compile::Compilation;
 use specgen_compiler::lower;
-use specgen_compiler::stability::platform::{DampedMode, Design, RestDynamics};
+use specgen_compiler::stability::platform::{DampedMode, Design, LoopKind, RestDynamics};
 use specgen_language::model::TaskSpace;
 use specgen_runtime::ControlMode;
 use specgen_studies::reproduce::write::digits;
 
-use super::chart::{Axis, BLUE, Chart, LINE, Note, pairs};
+use super::chart::{Axis, BLUE, Chart, DASHED, INK, LINE, Note, pairs};
 use super::evidence;
 use super::section::{Grid, Part, Rows, Section};
 use super::tracking::{AXES, short};
@@ -21,6 +21,8 @@ const POINTS: usize = 160;
 const LOWEST: f64 = 1.0;
 /// Upper end of the search for margins.
 const LARGEST: f64 = 10.0;
+/// ζ of structural modes that are drawn.
+const DAMPING_RATIOS: [f64; 2] = [1e-3, 1.0];
 
 /// A control mode in full.
 #[must_use]
@@ -98,7 +100,41 @@ pub fn section(compiled: &Compilation, mode: u32, command: &str) -> Section {
         let text = damped(design);
         section = section.text(&text).table(damping);
     }
+    if let Some((chart, text)) = border(compiled, design, law) {
+        section = section.part(Part::Columns(vec![vec![Part::Chart(chart)], vec![Part::Text(text)]]));
+    }
     section.text("The open loop is the model's, with the sampled platform, lags of amplifiers and gauges, notch and active damping, opened at the legs for all axes at once, so its gain margin is λ = ρ/ρ̂ of the legs. The limits of the control modes follow from eigenvalues of the complete closed loop.")
+}
+
+/// For each kind of structural mode, the smallest ζ at which the loop is stable, over the frequency of the mode, with the range
+/// that the spec declares; none without feedback.
+fn border(compiled: &Compilation, design: &Design, law: ControlMode) -> Option<(Chart, String)> {
+    let own = design.margins.iter().find(|one| one.law == law && LoopKind::of(law) != LoopKind::Open)?;
+    let (from, highest) = (design.structure_from, 0.5 / compiled.model.timing.period);
+    let least = compiled.model.structure.damping_ratio;
+    let title = format!("Smallest damping ratio ζ of a structural mode at which the loop is stable, {}", name(law));
+    let mut chart = Chart::new("border", &title, Axis::log("frequency", "Hz"), Axis::log("ζ", ""));
+    for border in &own.borders {
+        // Each value holds up to the next frequency; zero, which is not drawn, means that every damping is enough.
+        let ends = border.frequencies.iter().skip(1);
+        let steps = border.frequencies.iter().zip(ends).zip(&border.damping_ratios);
+        let points = steps.flat_map(|((start, end), ratio)| [[*start, *ratio], [*end, *ratio]]).collect();
+        chart = chart.with(border.kind, LINE, points);
+    }
+    let [_, top] = DAMPING_RATIOS;
+    let declared = vec![[from, top], [from, least], [highest, least]];
+    let actuator = &compiled.model.actuator;
+    chart = chart
+        .with("least of the declared range", DASHED, declared)
+        .colored(INK)
+        .noted(Note::Ring([actuator.resonance, actuator.damping_ratio], String::new()));
+    (chart.keys, chart.y_limits) = (true, Some(DAMPING_RATIOS));
+    let text = format!(
+        "A structural mode that the model lacks leaves the loop stable if its ζ is above the line of its kind, at the nominal point and at every corner of stiffness, gain, lag and delay. The spec declares such modes from {} Hz on with ζ of at least {}: no line may enter the area above and to the right of the dashed line. The ring is actuator.resonance, which is also a mode of the legs: the line of the leg must be below it.",
+        short(from),
+        short(least)
+    );
+    Some((chart, text))
 }
 
 /// Smallest benefit and largest cost of active damping.

@@ -105,6 +105,18 @@ fn the_border_in_closed_form_is_that_of_the_eigenvalues() {
     }
 }
 
+/// An interval of a border is within the declared range or outside of it.
+#[test]
+fn the_largest_damping_of_the_borders_is_what_the_declared_range_needs() {
+    let (found, _) = designed(|_, _| ()).unwrap();
+    for margins in &found.margins {
+        let worst = margins.borders.iter().filter_map(|border| border.worst(found.structure_from));
+        let most = worst.map(|[_, ratio]| ratio).fold(0.0, f64::max);
+        assert_eq!(most, margins.structure_damping, "{}", margins.law);
+        assert!(most <= 0.01, "{}", margins.law);
+    }
+}
+
 /// A design with active damping is stable with every mode of the range, at every corner, by eigenvalues.
 #[test]
 fn a_design_tolerates_every_mode_of_its_range() {

@@ -81,7 +81,7 @@ fn structure(design: &Design) -> String {
         for border in &one.borders {
             let _ = write!(text, "  {:<12}{:<7}", one.law.to_string(), border.kind);
             for frequency in frequencies {
-                let _ = write!(text, "{:>9}", shown(border.at(frequency)));
+                let _ = write!(text, "{:>9}", shown(border.within(frequency)));
             }
             let worst = border.worst(from).map_or("any".to_owned(), |[at, ratio]| format!("{ratio:.4} at {at:.0} Hz"));
             let _ = writeln!(text, "{worst:>22}");

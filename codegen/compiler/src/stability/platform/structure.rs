@@ -100,15 +100,19 @@ pub struct Border {
 }
 
 impl Border {
-    /// The frequency from `from` (Hz) on, or in the interval about it, that demands the most damping, and that ζ; none if every damping
-    /// is enough.
+    /// The frequency of the interval, from that about `from` (Hz) on, that demands the most damping, and that ζ; none if every damping
+    /// is enough. The lowest frequency of the declared range begins an interval.
     #[must_use]
     pub fn worst(&self, from: f64) -> Option<[f64; 2]> {
-        let first = self.frequencies.iter().rposition(|frequency| *frequency <= from).unwrap_or(0);
-        let both = self.frequencies.iter().zip(&self.damping_ratios).skip(first);
+        let both = self.frequencies.iter().zip(&self.damping_ratios).skip(self.interval(from).unwrap_or(0));
         both.filter(|(_, ratio)| **ratio > 0.0)
             .max_by(|a, b| a.1.total_cmp(b.1))
             .map(|(frequency, ratio)| [*frequency, *ratio])
+    }
+
+    /// Number of the interval about a frequency, Hz; none below the lowest.
+    fn interval(&self, frequency: f64) -> Option<usize> {
+        self.frequencies.iter().rposition(|one| *one <= frequency)
     }
 }
 
@@ -233,7 +237,10 @@ impl Corners {
         let lowest = self.of.basis.frequencies[0] / TAU;
         let highest = 0.5 / self.of.period;
         let at = |bin: usize| lowest * libm::pow(highest / lowest, bin as f64 / (BINS - 1) as f64);
-        let frequencies: Vec<f64> = (0..BINS).map(at).collect();
+        let mut frequencies: Vec<f64> = (0..BINS).map(at).collect();
+        // Below it, no mode is declared: an interval about it would show damping that no mode of the range needs.
+        let from = self.demand.from;
+        frequencies.insert(frequencies.partition_point(|one| *one < from), from);
         Border { kind: kind_of(flexure), damping_ratios: loci.border(flexure, &frequencies), frequencies }
     }
 }
@@ -248,7 +255,12 @@ fn kind_of(flexure: Flexure) -> &'static str {
 }
 
 impl Border {
-    /// ζ at a frequency, Hz, and about it; zero above the highest, which no tick sees.
+    /// ζ in the interval about a frequency, Hz; zero below the lowest.
+    pub(super) fn within(&self, frequency: f64) -> f64 {
+        self.interval(frequency).map_or(0.0, |interval| self.damping_ratios[interval])
+    }
+
+    /// ζ at a frequency, Hz, and in the intervals beside it; zero above the highest, which no tick sees.
     pub(super) fn at(&self, frequency: f64) -> f64 {
         let Some(next) = self.frequencies.iter().position(|one| *one > frequency) else { return 0.0 };
         let near = &self.damping_ratios[next.saturating_sub(2)..=next];
