@@ -117,7 +117,7 @@ pub struct Imperfections {
     pub mains: Vec<Mains>,
     /// Drift of each gauge, m/s, from the end of the preparation.
     pub gauge_drift_m_per_s: Six,
-    /// Jitter of the instant at which all six gauges are read, s rms.
+    /// Jitter of the instant at which all six gauges are read and, independently, of that at which the voltages change, s rms.
     pub timing_jitter_s: f64,
 }
 

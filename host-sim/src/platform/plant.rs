@@ -191,7 +191,12 @@ impl PlatformPlant {
     /// The pose of the gauges: h with their lag, which differs from the lag of each reading by less than 1e-14 m.
     #[must_use]
     pub fn seen(&self) -> Six {
-        self.gauges.as_ref().map_or_else(|| self.pose(), |gauges| gauges.each_ref().map(SmoothLag::output))
+        self.seen_motion()[0]
+    }
+
+    /// The same, and its rate, m/s and rad/s.
+    pub(super) fn seen_motion(&self) -> [Six; 2] {
+        seen(self.gauges.as_ref(), &[self.pose(), self.rate()])
     }
 
     /// What structural modes add to the readings of the gauges, m, and its rate, m/s; none without modes.
@@ -272,6 +277,13 @@ fn readings_near_rest(nominal: &PlatformParameters) -> Matrix6 {
     })
 }
 
+/// A pose and its rate behind the lag of the gauges.
+fn seen(gauges: Option<&[SmoothLag; 6]>, motion: &[Six; 2]) -> [Six; 2] {
+    gauges.map_or(*motion, |gauges| {
+        [gauges.each_ref().map(SmoothLag::output), std::array::from_fn(|k| gauges[k].rate(motion[0][k]))]
+    })
+}
+
 /// Gauges with a lag, and modes in readings, follow a step (s) from one pose and rate to another.
 fn gauges_follow(
     gauges: &mut Option<[SmoothLag; 6]>,
@@ -280,19 +292,13 @@ fn gauges_follow(
     after: &[Six; 2],
     step: f64,
 ) {
-    let seen = |gauges: &Option<[SmoothLag; 6]>, motion: &[Six; 2]| match gauges {
-        None => *motion,
-        Some(gauges) => {
-            [gauges.each_ref().map(SmoothLag::output), std::array::from_fn(|k| gauges[k].rate(motion[0][k]))]
-        }
-    };
-    let start = modes.as_ref().map(|_| seen(gauges, before));
+    let start = modes.as_ref().map(|_| seen(gauges.as_ref(), before));
     for (k, gauge) in gauges.iter_mut().flatten().enumerate() {
         gauge.set_step(step);
         gauge.advance([before[0][k], before[1][k]], [after[0][k], after[1][k]]);
     }
     if let (Some(modes), Some(start)) = (modes, start) {
-        modes.gauges_follow(&start, &seen(gauges, after), step);
+        modes.gauges_follow(&start, &seen(gauges.as_ref(), after), step);
     }
 }
 

@@ -23,8 +23,8 @@ use crate::plant::NoiseParameters;
 pub use bench::{BUSY, Bench, BenchState, Command, NOT_FOLLOWED, Request, Tick};
 pub use run::{OnBoard, PlatformRun, PoseSample, Record, RunOptions};
 
-/// Noise stream of the jitter, after those of gauges, amplifiers and force sensor.
-const JITTER_STREAM: u64 = 18;
+/// Noise streams of the jitter of readings and voltages, after those of gauges, amplifiers and force sensor.
+const JITTER_STREAMS: [u64; 2] = [18, 19];
 
 /// Noise around a plant.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -76,7 +76,10 @@ pub struct PlatformRig {
     amplifiers: [Gaussian; 6],
     /// Mains, drift and jitter of the gauges; none for a platform without imperfections.
     imperfections: Option<Imperfections>,
-    jitter: Gaussian,
+    /// Of readings and voltages.
+    jitter: [Gaussian; 2],
+    /// Voltages of the last interval, V.
+    held: Option<Six>,
     /// Since the preparation, s.
     time: f64,
 }
@@ -101,7 +104,8 @@ impl PlatformRig {
             force_sensor: ForceSensor::new(&noise.force, &nominal.force_range, seed),
             amplifiers: std::array::from_fn(|k| amplifier(&noise.channels, seed, k as u64)),
             imperfections: Some(&nominal.imperfections).filter(|all| !all.is_none()).cloned(),
-            jitter: Gaussian::new(nominal.imperfections.timing_jitter_s, seed, JITTER_STREAM),
+            jitter: JITTER_STREAMS.map(|stream| Gaussian::new(nominal.imperfections.timing_jitter_s, seed, stream)),
+            held: None,
             time: 0.0,
         }
     }
@@ -116,7 +120,7 @@ impl PlatformRig {
     /// Pre-cycle, rest and zero of the gauges, see [`PlatformPlant::prepare`].
     pub fn prepare(&mut self, preparation: &Preparation) {
         self.plant.prepare(preparation);
-        self.time = 0.0;
+        (self.time, self.held) = (0.0, None);
     }
 
     /// Draws the noise of the next `ticks` ticks now, so that later clones share it. The bits of a run do not change.
@@ -124,7 +128,7 @@ impl PlatformRig {
         self.gauges.iter_mut().for_each(|gauge| gauge.draw_ahead(ticks));
         self.amplifiers.iter_mut().for_each(|noise| noise.draw_ahead(ticks));
         self.force_sensor.draw_ahead(ticks);
-        self.jitter.draw_ahead(ticks);
+        self.jitter.iter_mut().for_each(|jitter| jitter.draw_ahead(ticks));
     }
 
     /// Period of the mains in the gauges, s; none without mains.
@@ -154,12 +158,12 @@ impl PlatformRig {
 
     /// Reads the six gauges, in m or V.
     pub fn read_gauges(&mut self) -> Six {
-        let mut pose = self.plant.seen();
+        let [mut pose, rate] = self.plant.seen_motion();
         let mut offsets = None;
         if let Some(imperfections) = &self.imperfections {
             // Early or late by some µs: to first order in it.
-            let late = if imperfections.timing_jitter_s > 0.0 { self.jitter.draw() } else { 0.0 };
-            pose.iter_mut().zip(self.plant.rate()).for_each(|(pose, rate)| *pose += late * rate);
+            let late = self.jitter[0].draw();
+            pose.iter_mut().zip(rate).for_each(|(pose, rate)| *pose += late * rate);
             let mut added = imperfections.offsets(self.time + late);
             if let Some([values, rates]) = self.plant.added() {
                 (0..6).for_each(|k| added[k] += values[k] + late * rates[k]);
@@ -200,6 +204,12 @@ impl PlatformRig {
     /// Holds six voltages (V) for `interval` (s), each with the noise of its amplifier.
     pub fn hold(&mut self, voltages: &Six, interval: f64) {
         let mut inputs = *voltages;
+        if self.imperfections.as_ref().is_some_and(|all| all.timing_jitter_s > 0.0) {
+            // Early or late by some µs: to first order, the volt-seconds that this adds, spread over the interval.
+            let share = self.jitter[1].draw() / interval;
+            let before = self.held.replace(*voltages).unwrap_or(*voltages);
+            (0..6).for_each(|k| inputs[k] += share * (before[k] - voltages[k]));
+        }
         for (input, noise) in inputs.iter_mut().zip(&mut self.amplifiers) {
             *input += noise.draw() - self.lowest_voltage;
         }

@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::closed_loop::Preparation;
+use crate::noise::Gaussian;
 use crate::plant::LegParameters;
 use crate::platform::rig::Noise;
 use crate::platform::{PlatformParameters, PlatformPlant, PlatformRig, REFERENCE_PLATFORM, Specimen, Structure};
@@ -334,30 +335,80 @@ fn mains_drift_and_jitter_are_in_the_readings_of_their_gauges() {
     let (sine, cosine) = (sine / ticks, cosine / ticks);
     assert!((libm::hypot(sine, cosine) / 5e-9 - 1.0).abs() < 1e-6);
     assert!((libm::atan2(cosine, sine) - 0.3).abs() < 1e-6);
+}
 
-    // Jitter: the error is speed times time, the same time at all gauges, and repeats.
-    let jittery = specimen(Imperfections { timing_jitter_s: 2e-6, ..Imperfections::default() });
-    let errors = || {
-        let [mut rig, mut plain] = [prepared_rig(&jittery), prepared_rig(&specimen(Imperfections::default()))];
-        let mut late = Vec::new();
-        for n in 0..3000 {
-            let ramp = [20.0 + 0.02 * f64::from(n % 1500); 6];
-            for rig in [&mut rig, &mut plain] {
-                rig.hold(&ramp, 1e-4);
+/// A platform with jitter and gauges of this lag, s.
+fn jittery(lag: f64) -> Specimen {
+    let mut specimen = specimen(Imperfections { timing_jitter_s: 2e-6, ..Imperfections::default() });
+    specimen.legs.iter_mut().for_each(|leg| leg.gauge_lag_s = lag);
+    specimen
+}
+
+#[test]
+fn jitter_of_readings_is_the_rate_of_the_gauges_times_the_same_time_for_all() {
+    let rms = |values: &[f64]| libm::sqrt(values.iter().map(|x| x * x).sum::<f64>() / values.len() as f64);
+    for lag in [0.0, 3e-4] {
+        let nominal = PlatformParameters::reference();
+        let errors = || {
+            let mut rig = prepared_rig(&jittery(lag));
+            let (mut late, mut apart) = (Vec::new(), Vec::new());
+            for n in 0..3000 {
+                rig.hold(&jumps(n), 1e-4);
+                let (pose, seen) = (rig.plant().pose(), rig.plant().seen());
+                let found = rig.read_gauges();
+                let rate = |k: usize| if lag > 0.0 { (pose[k] - seen[k]) / lag } else { rig.plant().rate()[k] };
+                // The first gauge reads z at x = 80 mm, the second at another place.
+                let times = [0, 1].map(|gauge| {
+                    let probe = &nominal.probes[gauge];
+                    let later = std::array::from_fn(|k| seen[k] + 1e-6 * rate(k));
+                    let [now, then] = [&seen, &later].map(|pose| probe.reading(nominal.height_m, pose));
+                    (found[gauge] - now) / ((then - now) / 1e-6)
+                });
+                let moves = (0..6).map(|k| rate(k).abs()).fold(0.0, worse) > 1e-3;
+                late.extend(Some(times[0]).filter(|_| moves));
+                apart.extend(Some(times[0] - times[1]).filter(|_| moves));
             }
-            let (found, clean) = (rig.read_gauges(), plain.read_gauges());
-            // The first gauge reads z at x = 80 mm.
-            let rate = rig.plant().rate()[2] - 0.08 * rig.plant().rate()[4];
-            if rate.abs() > 2e-5 {
-                late.push((found[0] - clean[0]) / rate);
+            (late, apart)
+        };
+        let (late, apart) = errors();
+        assert_eq!((&late, &apart), (&errors().0, &errors().1));
+        assert!(late.len() > 1000 && (1.85e-6..2.15e-6).contains(&rms(&late)), "{lag} {:e} {}", rms(&late), late.len());
+        assert!(rms(&apart) < 0.02 * rms(&late), "{lag} {:e}", rms(&apart));
+    }
+}
+
+/// To first order, with the pulse that makes it up spread over an interval.
+#[test]
+fn jitter_of_voltages_shifts_their_changes() {
+    const TICK: f64 = 1e-4;
+    let mut rig = prepared_rig(&jittery(0.0));
+    let mut times = Gaussian::new(2e-6, 5, 19);
+    let lowest = PlatformParameters::reference().lowest_voltage_v;
+    let (mut effect, mut error, mut before) = (0.0, 0.0, [20.0; 6]);
+    for n in 0..800 {
+        let after = [if n / 40 % 2 == 0 { 20.0 } else { 40.0 }; 6];
+        let late = times.draw();
+        let mut punctual = rig.plant().clone();
+        let mut shifted = punctual.clone();
+        rig.hold(&after, TICK);
+        // A plant without jitter cannot change its voltages before the tick.
+        if n % 40 == 0 && n > 0 && late > 0.0 {
+            punctual.hold(&after.map(|volts| volts - lowest), TICK);
+            shifted.hold(&before.map(|volts: f64| volts - lowest), late);
+            shifted.hold(&after.map(|volts| volts - lowest), TICK - late);
+            let mut jittered = rig.plant().clone();
+            for _ in 0..20 {
+                let along = [&punctual, &shifted, &jittered].map(|plant| plant.pose()[2]);
+                effect += (along[0] - along[1]).abs();
+                error += (along[2] - along[1]).abs();
+                for plant in [&mut punctual, &mut shifted, &mut jittered] {
+                    plant.hold(&after.map(|volts| volts - lowest), TICK);
+                }
             }
         }
-        late
-    };
-    let late = errors();
-    assert_eq!(late, errors());
-    let rms = libm::sqrt(late.iter().map(|x| x * x).sum::<f64>() / late.len() as f64);
-    assert!(late.len() > 1000 && (1.85e-6..2.15e-6).contains(&rms), "{rms:e} {}", late.len());
+        before = after;
+    }
+    assert!(effect > 1e-7 && error < 0.3 * effect, "{effect:e} {error:e}");
 }
 
 #[test]
