@@ -30,7 +30,8 @@ pub enum Factor {
     Noise,
     /// Delay of the voltages in control intervals: an integer, not a factor.
     DelayTicks,
-    /// Whether a random platform has what real structures have ([`crate::machine::StructureRange`]): 0 or 1.
+    /// Number of kinds of structural modes that a platform may have ([`crate::machine::StructureRange`]); an option is 0 or 1, for
+    /// none or those of the spec. A random platform also has the rest of what real structures have.
     Structure,
 }
 
@@ -225,6 +226,8 @@ impl Factors {
             };
             // The last option wins, as elsewhere.
             let option = given.iter().rev().find(|given| given.factor == factor).map(|given| given.range);
+            let kinds = if model.task_space.is_some() { model.structure.kinds.len() as f64 } else { 0.0 };
+            let option = option.map(|range| if factor == Factor::Structure { [kinds * range[1]; 2] } else { range });
             let (range, origin) = match (option, spec) {
                 (Some(range), _) => (range, Origin::Option),
                 (None, Some(range)) => (range, Origin::Spec),

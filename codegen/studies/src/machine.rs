@@ -276,6 +276,13 @@ pub struct StructureShares {
 }
 
 impl StructureShares {
+    /// Only a mode, of one of several kinds, that is hardest to tolerate: with the lowest frequency and the least damping.
+    #[must_use]
+    pub fn worst(kind: usize, kinds: usize) -> Self {
+        let mode = [(kind as f64 + 0.5) / kinds as f64, 0.0, 0.0];
+        Self { mode, joints: 0.0, mains: [0.0; 3], drift: [0.5; LEGS] }
+    }
+
     /// Adds this structure to a machine.
     pub fn add_to(&self, machine: &mut Imperfections, range: &StructureRange) {
         let one_of = |share: f64, count: usize| (share * count as f64) as usize;

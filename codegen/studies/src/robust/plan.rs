@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::deviation::Deviation;
 use super::factors::{Factor, Factors};
+use crate::machine::StructureShares;
 
 /// Up to this number of varied factors, every combination of their limits is a corner.
 const FACTORIAL: usize = 4;
@@ -90,6 +91,12 @@ fn corners(factors: &Factors, seed: u64) -> Vec<Member> {
         }
     };
     add("nominal".to_owned(), Deviation::common(Factor::nominal));
+    let kinds = factors.range(Factor::Structure)[1] as usize;
+    let structures = (0..kinds).map(|kind| (format!("structure-{}", kind + 1), StructureShares::worst(kind, kinds)));
+    let structures: Vec<(String, StructureShares)> = structures.collect();
+    for (name, shares) in &structures {
+        add(name.clone(), Deviation { structure: Some(*shares), ..Deviation::common(Factor::nominal) });
+    }
     let mut varied = Vec::new();
     for one in factors.iter() {
         let [low, high] = one.range;
@@ -103,8 +110,15 @@ fn corners(factors: &Factors, seed: u64) -> Vec<Member> {
             add(one.factor.to_string(), alone(low));
         }
     }
+    // Without a structural mode, and with each.
+    let mut add = |name: String, deviation: Deviation| {
+        add(name.clone(), deviation);
+        for (structure, shares) in &structures {
+            add(format!("{name}+{structure}"), Deviation { structure: Some(*shares), ..deviation });
+        }
+    };
     // A known deviation (without a range) is part of every combination.
-    if varied.len() <= FACTORIAL {
+    if varied.len() + usize::from(kinds > 0) <= FACTORIAL {
         for combination in 0..1_usize << varied.len() {
             let end = |factor: Factor| {
                 let place = varied.iter().position(|other| *other == factor);
@@ -135,7 +149,11 @@ mod tests {
 
     /// Factors of the spec of six legs, with `given` in place of its own.
     fn factors(given: &[&str]) -> Factors {
-        let spec = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../specs/legs.toml");
+        factors_of("legs.toml", given)
+    }
+
+    fn factors_of(spec: &str, given: &[&str]) -> Factors {
+        let spec = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../specs").join(spec);
         let given: Vec<UserRange> = given.iter().map(|text| UserRange::parse(text).unwrap()).collect();
         Factors::of(&compile(&spec).unwrap().model, &given)
     }
@@ -182,9 +200,12 @@ mod tests {
 
     #[test]
     fn structure_is_drawn_after_everything_else_and_fills_its_ranges() {
-        let plain = Plan::new(&factors(&[]), 300, 7);
-        let structured = Plan::new(&factors(&["structure=1"]), 300, 7);
-        assert_eq!(Plan::new(&factors(&["structure=0"]), 300, 7), plain);
+        let [plain, structured] = [vec![], vec!["structure=1"]].map(|given| {
+            let mut plan = Plan::new(&factors_of("reference.toml", &given), 300, 7);
+            plan.members.retain(|member| !member.name.contains("structure"));
+            plan
+        });
+        assert_eq!(Plan::new(&factors(&["structure=1"]), 30, 7), Plan::new(&factors(&[]), 30, 7), "six legs have none");
         let range = StructureRange {
             from_hz: 900.0,
             to_hz: 5000.0,
@@ -236,6 +257,34 @@ mod tests {
         let soft = &plan.members.iter().find(|member| member.name == "all-soft").unwrap().deviation;
         assert_eq!((soft.mass, soft.damping, soft.legs[3].stiffness, soft.legs[3].lag), (1.05, 0.7, 0.95, 1.5));
         assert_eq!(soft.legs[0].gain, 1.1);
+    }
+
+    #[test]
+    fn a_corner_may_have_one_structural_mode_at_its_lowest_frequency_and_least_damping() {
+        let plan = Plan::new(&factors_of("reference.toml", &["structure=1"]), 0, 1);
+        let kinds = [ModePlace::Leg(None), ModePlace::Gauge(None), ModePlace::Frame];
+        let participations = [None, Some(0.5), Some(-0.1)];
+        let range = StructureRange {
+            from_hz: 900.0,
+            to_hz: 5000.0,
+            damping_ratio: [0.01, 0.03],
+            kinds: kinds.into_iter().zip(participations).collect(),
+        };
+        for corner in ["nominal", "all-soft", "all-stiff"] {
+            let plain = plan.members.iter().find(|member| member.name == corner).unwrap();
+            for (number, (place, participation)) in (1..).zip(range.kinds.clone()) {
+                let name = if corner == "nominal" { String::new() } else { format!("{corner}+") };
+                let name = format!("{name}structure-{number}");
+                let member = plan.members.iter().find(|member| member.name == name).unwrap();
+                assert_eq!(Deviation { structure: None, ..member.deviation }, plain.deviation, "{name}");
+                let mut machine = Imperfections::default();
+                member.deviation.structure.unwrap().add_to(&mut machine, &range);
+                let expected = StructuralMode { place, frequency_hz: 900.0, damping_ratio: 0.01, participation };
+                assert_eq!(machine.modes, [expected], "{name}");
+                assert!(machine.mains[0].amplitude_m == 0.0 && machine.gauge_drift_m_per_s == [0.0; 6], "{name}");
+            }
+        }
+        assert_eq!(plan.members.iter().filter(|member| member.deviation.structure.is_some()).count(), 9);
     }
 
     #[test]
