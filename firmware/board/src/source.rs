@@ -18,7 +18,8 @@ use crate::requests::Command;
 pub enum EdgeCommand {
     /// This command.
     Command(Command),
-    /// The wave in [`Source::wave`], which has not started.
+    /// The wave in [`Source::wave`], which has not started. New settings leave it valid: only a platform has an input line,
+    /// and its limits of waves are constants.
     Wave,
 }
 

@@ -193,10 +193,7 @@ impl<D: Device> Loop<'_, D> {
                 keeper.ordered();
                 match order {
                     LoopCommand::Request(wish) => setpoints.wish(wish),
-                    LoopCommand::Configure(config) => {
-                        (self.config, configured) = (config, true);
-                        setpoints.configure(&self.config);
-                    }
+                    LoopCommand::Configure(config) => (self.config, configured) = (config, true),
                     LoopCommand::Wave(wave) => setpoints.start(wave),
                     LoopCommand::StopWave => setpoints.stop(),
                     LoopCommand::Await(awaited, wave) => setpoints.wait_for_edge(awaited, wave),

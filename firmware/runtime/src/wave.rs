@@ -153,12 +153,6 @@ impl<T: Real> Wave<T> {
         self.sequence = sequence;
     }
 
-    /// Whether its settings stay within these limits.
-    #[must_use]
-    pub fn fits(&self, limits: &Limits<T>) -> bool {
-        self.settings.check(limits).is_ok()
-    }
-
     /// Takes new settings, as words ([`Settings::to_words`]).
     ///
     /// # Errors

@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used)] // A panic is a failed test.
 
 use controller::supervised::{CONVERTER, Cause, Phase};
-use controller::{COMMAND_WORDS, CommandKind, GENERATOR_BUSY};
+use controller::{COMMAND_WORDS, CommandKind, Config, ControlMode, GENERATOR_BUSY, waves};
 use specgen_board::TargetStatus;
 use specgen_hal::Fault;
 use specgen_link::client::Client;
@@ -109,6 +109,23 @@ fn a_wave_that_waits_begins_with_the_tick_after_the_edge() {
     // A stop drops what waits and lets a wave that is under way come to rest.
     done(&mut client, &Request::Wave { action: WaveAction::Stop, words: Bytes(&[]) });
     assert!(line.with(|rig| rig.exchange.source.waves()));
+}
+
+#[test]
+fn new_settings_leave_a_wave_that_waits_as_it_is() {
+    let (line, mut client) = ready();
+    let words = bytes(&wave(1e-6, 5.0).to_words());
+    done(&mut client, &Request::Wave { action: WaveAction::StartOnEdge, words: Bytes(&words) });
+    let limits = waves::limits(&Config::new());
+    for mode in ControlMode::all() {
+        let config = Config::new().with(|settings| settings.mode = mode).unwrap();
+        assert_eq!(waves::limits(&config), limits, "{mode}");
+        done(&mut client, &Request::WriteConfig { words: Bytes(&bytes(&config.to_words())) });
+        line.tick(2);
+    }
+    assert_eq!(stage(&mut client), Stage::Waiting.word());
+    rise(&line);
+    assert_eq!(stage(&mut client), Stage::Begun.word());
 }
 
 #[test]

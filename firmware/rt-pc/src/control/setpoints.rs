@@ -1,7 +1,7 @@
 //! Source of the next tick's command: the operator's command, set-points of a wave, or corrections of a pass.
 
 use controller::supervised::{Phase, Request};
-use controller::waves::{self, Wave};
+use controller::waves::Wave;
 use controller::{COMMAND_WORDS, Config, State};
 use specgen_board::{EdgeCommand, Source};
 use specgen_link::EdgeStatus;
@@ -34,13 +34,6 @@ impl Setpoints {
             self.command = command;
         }
         self.request = wish.request;
-    }
-
-    /// New settings: a waiting wave that they do not permit will not start.
-    pub fn configure(&mut self, config: &Config) {
-        if !self.source.waves() {
-            self.source.wave.take_if(|wave| !wave.fits(&waves::limits(config)));
-        }
     }
 
     /// The input line in a tick, as [`specgen_runtime::pending::EdgeWait::sense`].
@@ -140,12 +133,12 @@ impl Setpoints {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use controller::Real;
+    use controller::{Real, waves};
     use specgen_runtime::pass::{self, Course};
     use specgen_runtime::pending;
     use specgen_runtime::playback::Knot;
     use specgen_runtime::setpoint::BUSY;
-    use specgen_runtime::wave::{Limits, Settings};
+    use specgen_runtime::wave::Settings;
 
     const LOW: Result<bool, ()> = Ok(false);
     const HIGH: Result<bool, ()> = Ok(true);
@@ -280,19 +273,11 @@ mod tests {
 
     #[test]
     fn a_wave_begins_behind_the_edge_if_it_may() {
-        let limits = waves::limits(&Config::new());
-        let mut beyond = Wave::new(Limits { low: [-2.0; 6], high: [2.0; 6], ..limits });
-        beyond.set(&Settings { center: [1.0; 6], ticks: 10, ..Settings::still() }).unwrap();
-        for (command, wave, stage_then) in [
-            (0, wave(10), pending::Stage::Begun),
-            // Under a trajectory, and far beyond the workspace of the settings since.
-            (3, wave(10), pending::Stage::Refused),
-            (0, beyond, pending::Stage::Refused),
-        ] {
+        // At rest, and under a trajectory.
+        for (command, stage_then) in [(0, pending::Stage::Begun), (3, pending::Stage::Refused)] {
             let mut setpoints = setpoints();
             setpoints.wish(OperatorRequest { command: Some([command; COMMAND_WORDS]), request: Request::None });
-            setpoints.wait_for_edge(EdgeCommand::Wave, Some(wave));
-            setpoints.configure(&Config::new());
+            setpoints.wait_for_edge(EdgeCommand::Wave, Some(wave(10)));
             tick(&mut setpoints, 1, LOW, 0);
             tick(&mut setpoints, 2, HIGH, 0);
             assert_eq!(stage(&setpoints), Some(stage_then));
