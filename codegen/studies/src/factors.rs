@@ -30,8 +30,8 @@ pub enum Factor {
     Noise,
     /// Delay of the voltages in control intervals: an integer, not a factor.
     DelayTicks,
-    /// Number of kinds of structural modes that a platform may have ([`crate::machine::StructureRange`]); an option is 0 or 1, for
-    /// none or those of the spec. A random platform also has the rest of what real structures have.
+    /// Kinds of structural modes that a platform may have ([`crate::machine::StructureRange`]), by number: none, or from 1 to the
+    /// last of the spec; an option is 0 or 1. A random platform also has the rest of what real structures have.
     Structure,
 }
 
@@ -227,7 +227,8 @@ impl Factors {
             // The last option wins, as elsewhere.
             let option = given.iter().rev().find(|given| given.factor == factor).map(|given| given.range);
             let kinds = if model.task_space.is_some() { model.structure.kinds.len() as f64 } else { 0.0 };
-            let option = option.map(|range| if factor == Factor::Structure { [kinds * range[1]; 2] } else { range });
+            let numbers = |[on, _]: [f64; 2]| if on * kinds > 0.0 { [1.0, kinds] } else { [0.0; 2] };
+            let option = option.map(|range| if factor == Factor::Structure { numbers(range) } else { range });
             let (range, origin) = match (option, spec) {
                 (Some(range), _) => (range, Origin::Option),
                 (None, Some(range)) => (range, Origin::Spec),
