@@ -205,7 +205,8 @@ impl PlatformRig {
     pub fn hold(&mut self, voltages: &Six, interval: f64) {
         let mut inputs = *voltages;
         if self.imperfections.as_ref().is_some_and(|all| all.timing_jitter_s > 0.0) {
-            // Early or late by some µs: to first order, the volt-seconds that this adds, spread over the interval.
+            // Early or late by some µs: to first order, below the slew limit, the volt-seconds that this adds, spread
+            // over the interval.
             let share = self.jitter[1].draw() / interval;
             let before = self.held.replace(*voltages).unwrap_or(*voltages);
             (0..6).for_each(|k| inputs[k] += share * (before[k] - voltages[k]));
