@@ -4,7 +4,7 @@
 //! readings Y_n. Its voltages are held until t_{n+1}, where Y_{n+1} is read.
 
 use std::collections::VecDeque;
-use std::fmt::{self, Write as _};
+use std::fmt::Write as _;
 use std::ops::ControlFlow;
 
 use crate::controller::{ControllerError, TickController};
@@ -122,11 +122,15 @@ pub struct Run {
 }
 
 /// Reason why a run ended early.
-#[derive(Debug)]
+#[derive(Debug, thiserror::Error)]
 pub enum RunError {
     /// The controller lacks a word that the loop needs, or refuses a configuration.
-    Controller(ControllerError),
+    #[error(transparent)]
+    Controller(#[from] ControllerError),
     /// It output a voltage that is not finite.
+    #[error(
+        "tick {tick}: the controller's voltage[{leg}] is not finite, which its design forbids; report this as a defect of specgen with the spec"
+    )]
     NotFinite {
         /// Tick, counted from 0.
         tick: usize,
@@ -134,6 +138,9 @@ pub enum RunError {
         leg: usize,
     },
     /// The run has no valid timing.
+    #[error(
+        "a control interval of {interval} s in a trajectory of {duration} s; expected 1 to 100,000,000 ticks of at most {LONGEST_INTERVAL} s"
+    )]
     Timing {
         /// Control interval, s.
         interval: f64,
@@ -141,6 +148,9 @@ pub enum RunError {
         duration: f64,
     },
     /// A platform controller did not reach its bias pose.
+    #[error(
+        "the controller is still on its way to the start of the path or the bias pose after {limit} s (status {status:#x}); lower the bias or raise control.setpoint.speed in the spec"
+    )]
     NotReady {
         /// Time limit, s.
         limit: f64,
@@ -148,6 +158,13 @@ pub enum RunError {
         status: u32,
     },
     /// A platform controller did not follow its path to the last set-point.
+    #[error(
+        "the run ended early, after {:.3} s of a path of {:.3} s (status {status:#x}{}{}): there is no figure, for the error of a part is not that of the path",
+        coverage.seconds,
+        coverage.path_seconds,
+        if *status == 0 { "" } else { ": " },
+        status_words(*status)
+    )]
     EndedEarly {
         /// How far it followed.
         coverage: Coverage,
@@ -155,62 +172,16 @@ pub enum RunError {
         status: u32,
     },
     /// A platform controller is still busy after the last set-point of its path.
+    #[error(
+        "the controller is still busy after {coverage} (status {status:#x}: {}): there is no figure, for the path that it plays is longer",
+        status_words(*status)
+    )]
     NotEnded {
         /// The covered part of the path: all of it.
         coverage: Coverage,
         /// Its status word then.
         status: u32,
     },
-}
-
-impl fmt::Display for RunError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Controller(error) => error.fmt(f),
-            Self::NotFinite { tick, leg } => {
-                write!(
-                    f,
-                    "tick {tick}: the controller's voltage[{leg}] is not finite, which its design forbids; report this as a defect of specgen with the spec"
-                )
-            }
-            Self::Timing { interval, duration } => {
-                write!(
-                    f,
-                    "a control interval of {interval} s in a trajectory of {duration} s; expected 1 to 100,000,000 ticks of at most {LONGEST_INTERVAL} s"
-                )
-            }
-            Self::NotReady { limit, status } => {
-                write!(
-                    f,
-                    "the controller is still on its way to the start of the path or the bias pose after {limit} s (status {status:#x}); lower the bias or raise control.setpoint.speed in the spec"
-                )
-            }
-            Self::EndedEarly { coverage, status } => {
-                let Coverage { seconds, path_seconds } = coverage;
-                write!(
-                    f,
-                    "the run ended early, after {seconds:.3} s of a path of {path_seconds:.3} s (status {status:#x}{}{}): there is no figure, for the error of a part is not that of the path",
-                    if *status == 0 { "" } else { ": " },
-                    status_words(*status)
-                )
-            }
-            Self::NotEnded { coverage, status } => {
-                write!(
-                    f,
-                    "the controller is still busy after {coverage} (status {status:#x}: {}): there is no figure, for the path that it plays is longer",
-                    status_words(*status)
-                )
-            }
-        }
-    }
-}
-
-impl std::error::Error for RunError {}
-
-impl From<ControllerError> for RunError {
-    fn from(error: ControllerError) -> Self {
-        Self::Controller(error)
-    }
 }
 
 impl From<DescriptionError> for RunError {

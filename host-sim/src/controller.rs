@@ -6,7 +6,6 @@ mod library;
 mod supervised;
 
 use std::alloc::Layout;
-use std::fmt;
 use std::path::{Path, PathBuf};
 
 use crate::description::{Description, DescriptionError};
@@ -75,16 +74,23 @@ impl<F: FnMut(&mut u64, &[u64], &mut [u64])> TickController for StandIn<F> {
 }
 
 /// Reason why a controller cannot be run.
-#[derive(Debug)]
+#[derive(Debug, thiserror::Error)]
 pub enum ControllerError {
     /// The library cannot be opened, or lacks a function.
+    #[error(
+        "{}: not a controller library: {}; build the host library of the emitted workspace and name its file",
+        path.display(),
+        reasons(cause)
+    )]
     Load {
         /// The library file.
         path: PathBuf,
         /// What the loader says.
+        #[source]
         cause: libloading::Error,
     },
     /// It has another version of the interface.
+    #[error("{}: interface version {found}, expected {ABI_VERSION}; build it with this specgen", path.display())]
     Abi {
         /// The library file.
         path: PathBuf,
@@ -92,8 +98,10 @@ pub enum ControllerError {
         found: u32,
     },
     /// Its self-description is unusable.
-    Description(DescriptionError),
+    #[error(transparent)]
+    Description(#[from] DescriptionError),
     /// A configuration of the wrong length.
+    #[error("{given} configuration words; this controller has {expected}")]
     ConfigLength {
         /// Number of words given.
         given: usize,
@@ -101,44 +109,15 @@ pub enum ControllerError {
         expected: usize,
     },
     /// A configuration word is refused.
+    #[error(
+        "the controller refuses configuration word `{name}` = {word:016x}; docs/settings.md has its range, which the spec limits"
+    )]
     Config {
         /// Name of the word.
         name: String,
         /// Its bits.
         word: u64,
     },
-}
-
-impl fmt::Display for ControllerError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Load { path, cause } => {
-                write!(
-                    f,
-                    "{}: not a controller library: {}; build the host library of the emitted workspace and name its file",
-                    path.display(),
-                    reasons(cause)
-                )
-            }
-            Self::Abi { path, found } => {
-                write!(
-                    f,
-                    "{}: interface version {found}, expected {ABI_VERSION}; build it with this specgen",
-                    path.display()
-                )
-            }
-            Self::Description(error) => error.fmt(f),
-            Self::ConfigLength { given, expected } => {
-                write!(f, "{given} configuration words; this controller has {expected}")
-            }
-            Self::Config { name, word } => {
-                write!(
-                    f,
-                    "the controller refuses configuration word `{name}` = {word:016x}; docs/settings.md has its range, which the spec limits"
-                )
-            }
-        }
-    }
 }
 
 /// An error with its chain of causes, which the loader keeps separate.
@@ -151,22 +130,6 @@ fn reasons(error: &dyn std::error::Error) -> String {
         next = error.source();
     }
     text
-}
-
-impl std::error::Error for ControllerError {
-    fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
-        match self {
-            Self::Load { cause, .. } => Some(cause),
-            Self::Description(error) => Some(error),
-            _ => None,
-        }
-    }
-}
-
-impl From<DescriptionError> for ControllerError {
-    fn from(error: DescriptionError) -> Self {
-        Self::Description(error)
-    }
 }
 
 /// A controller with one configuration and one state.

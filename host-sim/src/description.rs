@@ -1,7 +1,6 @@
 //! A controller's self-description: its spec, its arithmetic and the names of its words.
 
 use std::collections::BTreeMap;
-use std::fmt;
 
 use crate::word::{Scalar, WordKind};
 
@@ -25,11 +24,13 @@ pub struct Description {
 }
 
 /// Reason why a description or a name was refused.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum DescriptionError {
     /// A key is missing.
+    #[error("the controller's description lacks `{0}`; it was built by another version of specgen: build it again")]
     Missing(&'static str),
     /// A key has an invalid value.
+    #[error("the controller's description has `{key}={value}`; expected {expected}: build it again")]
     Bad {
         /// The key.
         key: &'static str,
@@ -39,6 +40,7 @@ pub enum DescriptionError {
         expected: &'static str,
     },
     /// The controller does not have the requested word.
+    #[error("the controller has no word `{name}`; it has {}", known.join(", "))]
     NoWord {
         /// The name asked for.
         name: String,
@@ -46,6 +48,7 @@ pub enum DescriptionError {
         known: Vec<String>,
     },
     /// A number that the word cannot represent.
+    #[error("`{name}` cannot be {value}; expected a whole number from 0 to 2^53")]
     NotAWord {
         /// The word's name.
         name: String,
@@ -53,30 +56,6 @@ pub enum DescriptionError {
         value: f64,
     },
 }
-
-impl fmt::Display for DescriptionError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Missing(key) => {
-                write!(
-                    f,
-                    "the controller's description lacks `{key}`; it was built by another version of specgen: build it again"
-                )
-            }
-            Self::Bad { key, value, expected } => {
-                write!(f, "the controller's description has `{key}={value}`; expected {expected}: build it again")
-            }
-            Self::NoWord { name, known } => {
-                write!(f, "the controller has no word `{name}`; it has {}", known.join(", "))
-            }
-            Self::NotAWord { name, value } => {
-                write!(f, "`{name}` cannot be {value}; expected a whole number from 0 to 2^53")
-            }
-        }
-    }
-}
-
-impl std::error::Error for DescriptionError {}
 
 impl Description {
     /// Output lines of triggers.

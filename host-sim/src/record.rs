@@ -8,7 +8,6 @@ mod recorded;
 mod replay;
 mod writer;
 
-use std::fmt;
 use std::io::{self, Read};
 
 use specgen_runtime::record::{
@@ -21,7 +20,7 @@ use crate::description::{Description, DescriptionError, fields};
 pub use csv::{ReplayedRows, write_csv};
 pub use recorded::{RecordedController, RecordingEnd};
 pub use replay::{Divergence, PhaseChange, Replay, ReplayError, replay};
-pub use writer::{Taker, Writer};
+pub use writer::Writer;
 
 /// Largest valid block, words: 64 MiB.
 const LARGEST_BLOCK: u64 = 1 << 23;
@@ -95,45 +94,23 @@ pub enum FileItem {
 }
 
 /// Reason why a file is not a record.
-#[derive(Debug)]
+#[derive(Debug, thiserror::Error)]
 pub enum RecordError {
     /// It does not begin as a record does.
+    #[error("not a record: it does not begin with SPGRECRD; name a file that a recorder wrote")]
     NotARecord,
     /// It is of another version of the format.
+    #[error("record format {0}, expected {FORMAT}; use the specgen version that the target was built with")]
     Format(u32),
     /// Its start is cut off or damaged.
+    #[error("the record's beginning is damaged ({0}); fetch or copy it again")]
     Header(String),
     /// Its description is unusable.
+    #[error("the record's beginning: {0}")]
     Description(DescriptionError),
     /// It cannot be read.
-    Io(io::Error),
-}
-
-impl fmt::Display for RecordError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::NotARecord => {
-                write!(f, "not a record: it does not begin with SPGRECRD; name a file that a recorder wrote")
-            }
-            Self::Format(found) => {
-                write!(
-                    f,
-                    "record format {found}, expected {FORMAT}; use the specgen version that the target was built with"
-                )
-            }
-            Self::Header(reason) => write!(f, "the record's beginning is damaged ({reason}); fetch or copy it again"),
-            Self::Description(error) => write!(f, "the record's beginning: {error}"),
-            Self::Io(error) => write!(f, "cannot be read: {error}"),
-        }
-    }
-}
-
-impl std::error::Error for RecordError {}
-
-impl From<io::Error> for RecordError {
-    fn from(error: io::Error) -> Self {
-        Self::Io(error)
-    }
+    #[error("cannot be read: {0}")]
+    Io(#[from] io::Error),
 }
 
 /// Reads a record item by item.

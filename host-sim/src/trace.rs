@@ -10,7 +10,7 @@
 //! rows                            u64 words: inputs, outputs, state digest
 //! ```
 
-use std::fmt::{self, Write};
+use std::fmt::Write;
 
 use crate::description::{Description, DescriptionError};
 use crate::word::WordKind;
@@ -30,13 +30,16 @@ pub struct Trace {
 }
 
 /// Reason why a file is not a trace.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum TraceError {
     /// It does not begin as a trace does.
+    #[error("not a trace: it does not begin with SPGTRACE; record it again")]
     NotATrace,
     /// It is of another version of the format.
+    #[error("trace format {0}, expected {VERSION}; record it with this version")]
     Version(u32),
     /// It is too short, or continues after its last row.
+    #[error("the trace has {found} bytes, expected {expected}: the recording was cut or mixed; record it again")]
     Length {
         /// Bytes announced by its header.
         expected: u64,
@@ -44,26 +47,9 @@ pub enum TraceError {
         found: u64,
     },
     /// Its description is unusable.
+    #[error("the trace's header: {0}")]
     Description(DescriptionError),
 }
-
-impl fmt::Display for TraceError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::NotATrace => write!(f, "not a trace: it does not begin with SPGTRACE; record it again"),
-            Self::Version(found) => write!(f, "trace format {found}, expected {VERSION}; record it with this version"),
-            Self::Length { expected, found } => {
-                write!(
-                    f,
-                    "the trace has {found} bytes, expected {expected}: the recording was cut or mixed; record it again"
-                )
-            }
-            Self::Description(error) => write!(f, "the trace's header: {error}"),
-        }
-    }
-}
-
-impl std::error::Error for TraceError {}
 
 impl Trace {
     /// An empty trace of a controller.

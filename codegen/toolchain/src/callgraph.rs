@@ -44,14 +44,14 @@ impl CallGraph {
     /// # Errors
     /// [`TargetError::MalformedImage`] if it is no ELF file or its tables are damaged.
     pub fn read(elf: &[u8]) -> Result<Self, TargetError> {
-        let file = object::File::parse(elf).map_err(malformed)?;
+        let file = object::File::parse(elf).map_err(TargetError::malformed)?;
         let frames = stack_sizes(&file)?;
         let mut names: BTreeMap<u64, (BTreeSet<String>, u64)> = BTreeMap::new();
         let mut marks: BTreeMap<u64, bool> = BTreeMap::new();
         let mut symbols = BTreeMap::new();
         let mut thunks = BTreeMap::new();
         for symbol in file.symbols() {
-            let name = symbol.name().map_err(malformed)?;
+            let name = symbol.name().map_err(TargetError::malformed)?;
             if let Some(is_code) = mapping(name) {
                 marks.insert(symbol.address(), is_code);
             } else if symbol.kind() == SymbolKind::Text && symbol.is_definition() && !name.is_empty() {
@@ -125,10 +125,6 @@ impl Function {
 /// Prefix of the linker's thunks: jumps to functions out of branch range, in another memory.
 const THUNK: &str = "__Thumbv7ABSLongThunk_";
 
-fn malformed(error: object::Error) -> TargetError {
-    TargetError::MalformedImage { text: error.to_string() }
-}
-
 /// `$t`, `$d` and their numbered forms mark the start of code and data (ARM IHI 0044, 5.5.5).
 fn mapping(name: &str) -> Option<bool> {
     match name.split('.').next() {
@@ -143,7 +139,7 @@ fn section_at<'a>(file: &object::File<'a>, address: u64) -> Result<Option<(u64, 
     for section in file.sections() {
         let end = section.address() + section.size();
         if section.kind() == object::SectionKind::Text && (section.address()..end).contains(&address) {
-            let data = section.data().map_err(malformed)?;
+            let data = section.data().map_err(TargetError::malformed)?;
             // The offset is below the section's size; if the image lies about its data, the result is empty.
             let offset = usize::try_from(address - section.address()).unwrap_or(usize::MAX);
             return Ok(Some((end, data.get(offset..).unwrap_or_default())));
@@ -156,7 +152,7 @@ fn section_at<'a>(file: &object::File<'a>, address: u64) -> Result<Option<(u64, 
 fn stack_sizes(file: &object::File<'_>) -> Result<BTreeMap<u64, u64>, TargetError> {
     let mut sizes = BTreeMap::new();
     for section in file.sections().filter(|section| section.name() == Ok(".stack_sizes")) {
-        let mut data = section.data().map_err(malformed)?;
+        let mut data = section.data().map_err(TargetError::malformed)?;
         while let Some((address, rest)) = data.split_first_chunk::<4>() {
             let (size, rest) = uleb128(rest).ok_or_else(|| TargetError::MalformedImage {
                 text: "section .stack_sizes ends within an entry".into(),

@@ -79,9 +79,9 @@ pub fn check(elf: &[u8], tick: Option<&str>, rules: Rules) -> Result<TickChecks,
     let root = named.ok_or_else(|| TargetError::MalformedImage {
         text: format!("none of the tick functions {} exists", TICKS.join(", ")),
     })?;
-    let bound = stack::bound(elf, root)?;
-    let start = graph.symbols.get(root).copied().or_else(|| by_name(&graph, root));
-    let reach = Reach::from(&graph, start.unwrap_or_default());
+    let start = stack::start_of(&graph, root)?;
+    let bound = stack::bound_in(&graph, start);
+    let reach = Reach::from(&graph, start);
     let mut faults = Vec::new();
     let mut add = |rule: Rule, text: String| faults.push(Fault { rule, text });
     for (address, function) in reach.functions() {
@@ -155,10 +155,6 @@ fn is_soft_double(name: &str) -> bool {
     }
     let libgcc = name.starts_with("__") && (name.ends_with("df2") || name.ends_with("df3") || name.ends_with("df"));
     libgcc || name.starts_with("__fixdf") || name.starts_with("__fixunsdf") || name.starts_with("__truncdf")
-}
-
-fn by_name(graph: &CallGraph, name: &str) -> Option<u64> {
-    graph.functions.iter().find(|(_, function)| function.name == name).map(|(address, _)| *address)
 }
 
 fn some(names: &[String]) -> String {

@@ -31,8 +31,7 @@ pub struct Footprint {
 /// # Errors
 /// [`TargetError::MalformedImage`] if it is not an ELF file or its tables are damaged.
 pub fn footprint(elf: &[u8]) -> Result<Footprint, TargetError> {
-    let malformed = |error: object::Error| TargetError::MalformedImage { text: error.to_string() };
-    let file = object::File::parse(elf).map_err(malformed)?;
+    let file = object::File::parse(elf).map_err(TargetError::malformed)?;
     let mut result = Footprint {
         flash: 0,
         code: 0,
@@ -57,7 +56,7 @@ pub fn footprint(elf: &[u8]) -> Result<Footprint, TargetError> {
     }
     result.flash += result.code + result.constants;
     for symbol in file.symbols() {
-        let mangled = symbol.name().map_err(malformed)?;
+        let mangled = symbol.name().map_err(TargetError::malformed)?;
         let name = format!("{:#}", rustc_demangle::demangle(mangled));
         if is_panic(&name) {
             result.panic_symbols.push(name);
@@ -95,11 +94,10 @@ pub(super) fn is_allocator(name: &str) -> bool {
 /// # Errors
 /// [`TargetError::MalformedImage`] if it is not an ELF file or its tables are damaged.
 pub fn exported(elf: &[u8]) -> Result<Vec<String>, TargetError> {
-    let malformed = |error: object::Error| TargetError::MalformedImage { text: error.to_string() };
-    let file = object::File::parse(elf).map_err(malformed)?;
+    let file = object::File::parse(elf).map_err(TargetError::malformed)?;
     let mut names = Vec::new();
     for symbol in file.dynamic_symbols().filter(|symbol| symbol.is_definition()) {
-        names.push(symbol.name().map_err(malformed)?.to_owned());
+        names.push(symbol.name().map_err(TargetError::malformed)?.to_owned());
     }
     names.sort();
     Ok(names)

@@ -54,17 +54,13 @@ fn machinery(graph: &CallGraph) -> BTreeSet<u64> {
 /// Line information of an image.
 pub(super) type DebugInfo<'a> = Context<EndianSlice<'a, LittleEndian>>;
 
-fn malformed(error: impl std::fmt::Display) -> TargetError {
-    TargetError::MalformedImage { text: error.to_string() }
-}
-
 pub(super) fn debug_info(elf: &[u8]) -> Result<DebugInfo<'_>, TargetError> {
-    let file = object::File::parse(elf).map_err(malformed)?;
+    let file = object::File::parse(elf).map_err(TargetError::malformed)?;
     let section = |id: gimli::SectionId| {
         let data = file.section_by_name(id.name()).map_or(Ok(&[][..]), |section| section.data());
-        data.map(|data| EndianSlice::new(data, LittleEndian)).map_err(malformed)
+        data.map(|data| EndianSlice::new(data, LittleEndian)).map_err(TargetError::malformed)
     };
-    Context::from_dwarf(Dwarf::load(section)?).map_err(malformed)
+    Context::from_dwarf(Dwarf::load(section)?).map_err(TargetError::malformed)
 }
 
 /// The source lines of some addresses in a function, without duplicates.
@@ -78,9 +74,9 @@ pub(super) fn lines<'a>(
 }
 
 fn site(debug: &DebugInfo<'_>, function: &Function, place: u64) -> Result<String, TargetError> {
-    let mut frames = debug.find_frames(place).skip_all_loads().map_err(malformed)?;
+    let mut frames = debug.find_frames(place).skip_all_loads().map_err(TargetError::malformed)?;
     let mut lines = Vec::new();
-    while let Some(frame) = frames.next().map_err(malformed)? {
+    while let Some(frame) = frames.next().map_err(TargetError::malformed)? {
         if let Some((file, line)) = frame.location.and_then(|l| Some((l.file?.to_owned(), l.line?)))
             && owner::crate_of_file(&file) != "core"
         {

@@ -108,8 +108,7 @@ impl Size {
 /// # Errors
 /// [`TargetError::MalformedImage`] if it is not an ELF file or its tables are damaged.
 pub fn size(elf: &[u8]) -> Result<Size, TargetError> {
-    let malformed = |error: object::Error| TargetError::MalformedImage { text: error.to_string() };
-    let file = object::File::parse(elf).map_err(malformed)?;
+    let file = object::File::parse(elf).map_err(TargetError::malformed)?;
     let debug = panics::debug_info(elf)?;
     let mut sections = Vec::new();
     let mut owners: BTreeMap<String, Owner> = BTreeMap::new();
@@ -122,7 +121,7 @@ pub fn size(elf: &[u8]) -> Result<Size, TargetError> {
         }
         let ram = sh_flags.0 & object::elf::SHF_WRITE.0 != 0;
         let flash = section.kind() != SectionKind::UninitializedData;
-        let name = section.name().map_err(malformed)?.to_owned();
+        let name = section.name().map_err(TargetError::malformed)?.to_owned();
         sections.push(Section { name, address: section.address(), bytes: section.size(), flash, ram });
         if !flash {
             continue;
@@ -132,7 +131,7 @@ pub fn size(elf: &[u8]) -> Result<Size, TargetError> {
             code(&debug, section.address(), end, &mut owners)?;
             continue;
         }
-        let bytes = section.data().map_err(malformed)?;
+        let bytes = section.data().map_err(TargetError::malformed)?;
         found = found.or_else(|| find_identity(bytes));
         target = target.or_else(|| find_target(bytes));
         constants(&file, section.address(), end, &mut owners);
@@ -140,7 +139,7 @@ pub fn size(elf: &[u8]) -> Result<Size, TargetError> {
     for symbol in file.symbols().filter(|symbol| symbol.kind() == SymbolKind::Data && symbol.size() > 0) {
         let held = |section: &&Section| (section.address..section.address + section.bytes).contains(&symbol.address());
         if sections.iter().find(held).is_some_and(|section| section.ram) {
-            let name = demangled(symbol.name().map_err(malformed)?);
+            let name = demangled(symbol.name().map_err(TargetError::malformed)?);
             variables.insert(name, symbol.size());
         }
     }
@@ -169,19 +168,11 @@ fn owner<'a>(owners: &'a mut BTreeMap<String, Owner>, name: &str) -> &'a mut Own
 
 /// Assigns the code between two addresses by source file; a line extends to the next one, including literals after it.
 fn code(debug: &DebugInfo<'_>, start: u64, end: u64, owners: &mut BTreeMap<String, Owner>) -> Result<(), TargetError> {
-    let malformed = |error: addr2line::gimli::Error| TargetError::MalformedImage { text: error.to_string() };
-    let mut known = start;
-    for (address, bytes, location) in debug.find_location_range(start, end).map_err(malformed)? {
-        // Rows are sorted by address; an overlapping row counts from the end of the last one.
-        let (from, to) = (address.max(known), (address + bytes).min(end));
-        if to <= from {
-            continue;
-        }
-        owner(owners, NO_LINES).code += from - known;
-        owner(owners, &location.file.map_or_else(|| NO_LINES.to_owned(), crate_of_file)).code += to - from;
-        known = to;
-    }
-    owner(owners, NO_LINES).code += end - known;
+    let lines =
+        debug.find_location_range(start, end).map_err(TargetError::malformed)?.map(|(address, bytes, location)| {
+            (address, bytes, location.file.map_or_else(|| NO_LINES.to_owned(), crate_of_file))
+        });
+    assign(start, end, lines, NO_LINES, |name, bytes| owner(owners, name).code += bytes);
     Ok(())
 }
 
@@ -193,17 +184,29 @@ fn constants(file: &object::File<'_>, start: u64, end: u64, owners: &mut BTreeMa
         .filter_map(|symbol| Some((symbol.address(), symbol.size(), demangled(symbol.name().ok()?))))
         .collect();
     symbols.sort();
+    let symbols = symbols.into_iter().map(|(address, bytes, name)| (address, bytes, crate_of_symbol(&name).to_owned()));
+    assign(start, end, symbols, UNNAMED, |name, bytes| owner(owners, name).constants += bytes);
+}
+
+/// Assigns the bytes between two addresses to owners. `rows` are address, bytes and owner, sorted by address; an overlapping row
+/// counts from the end of the last one. Bytes in no row belong to `others`.
+fn assign(
+    start: u64,
+    end: u64,
+    rows: impl Iterator<Item = (u64, u64, String)>,
+    others: &str,
+    mut add: impl FnMut(&str, u64),
+) {
     let mut known = start;
-    for (address, bytes, name) in symbols {
+    for (address, bytes, name) in rows {
         let (from, to) = (address.max(known), (address + bytes).min(end));
-        if to <= from {
-            continue;
+        if to > from {
+            add(others, from - known);
+            add(&name, to - from);
+            known = to;
         }
-        owner(owners, UNNAMED).constants += from - known;
-        owner(owners, crate_of_symbol(&name)).constants += to - from;
-        known = to;
     }
-    owner(owners, UNNAMED).constants += end - known;
+    add(others, end - known);
 }
 
 /// `controller` for `controller::hysteresis::EVERETT_0`, also if it is part of an implementation: `<controller::…`.

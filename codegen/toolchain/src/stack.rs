@@ -55,14 +55,15 @@ pub fn bound(elf: &[u8], root: &str) -> Result<StackBound, TargetError> {
 }
 
 /// Start address of the function.
-fn start_of(graph: &CallGraph, root: &str) -> Result<u64, TargetError> {
+pub(super) fn start_of(graph: &CallGraph, root: &str) -> Result<u64, TargetError> {
     let demangled = || graph.functions.iter().find(|(_, function)| function.name == root).map(|(address, _)| *address);
     graph.symbols.get(root).copied().or_else(demangled).ok_or_else(|| TargetError::MalformedImage {
         text: format!("it has no function `{root}`; it may be stripped or built by another specgen"),
     })
 }
 
-fn bound_in(graph: &CallGraph, start: u64) -> StackBound {
+/// The bound for everything reachable from this address.
+pub(super) fn bound_in(graph: &CallGraph, start: u64) -> StackBound {
     let mut walk = Walk { graph, deepest: BTreeMap::new(), open: Vec::new(), cycles: BTreeSet::new() };
     let bytes = walk.visit(start);
     let cycles = walk.cycles;
@@ -114,8 +115,7 @@ impl Reserve {
     /// # Errors
     /// [`TargetError::MalformedImage`] if the file is damaged.
     pub fn of(elf: &[u8]) -> Result<Option<Self>, TargetError> {
-        let malformed = |error: object::Error| TargetError::MalformedImage { text: error.to_string() };
-        let file = object::File::parse(elf).map_err(malformed)?;
+        let file = object::File::parse(elf).map_err(TargetError::malformed)?;
         let address =
             |name: &str| file.symbols().find(|symbol| symbol.name() == Ok(name)).map(|symbol| symbol.address());
         let (Some(top), Some(end)) = (address("_stack_start"), address("_stack_end")) else { return Ok(None) };
@@ -123,8 +123,11 @@ impl Reserve {
         let depth = |address: u64| bound_in(&graph, address).bytes;
         let startup = bound_in(&graph, start_of(&graph, "main")?);
         let [tick, background] = [start_of(&graph, TICK)?, start_of(&graph, BACKGROUND)?];
-        let vectors =
-            file.section_by_name(".vector_table").map(|section| section.data()).transpose().map_err(malformed)?;
+        let vectors = file
+            .section_by_name(".vector_table")
+            .map(|section| section.data())
+            .transpose()
+            .map_err(TargetError::malformed)?;
         let handlers = vectors.unwrap_or_default().as_chunks().0.iter().skip(SYSTEM);
         let others = handlers.map(|word| u64::from(u32::from_le_bytes(*word) & !1));
         let others = others.filter(|address| ![tick, background].contains(address));

@@ -70,14 +70,16 @@ impl Clocks {
     /// # Errors
     /// [`TargetError::MalformedImage`] if the file is damaged or not a board image of this specgen.
     pub fn of(elf: &[u8], mcu: Mcu) -> Result<Self, TargetError> {
-        let malformed = |error: object::Error| TargetError::MalformedImage { text: error.to_string() };
-        let file = object::File::parse(elf).map_err(malformed)?;
+        let file = object::File::parse(elf).map_err(TargetError::malformed)?;
         let strange = || TargetError::MalformedImage { text: format!("it has no {SYMBOL} of this specgen") };
         let named = |name: &str| file.symbols().find(|symbol| symbol.name() == Ok(name)).ok_or_else(strange);
         let (symbol, tick) = (named(SYMBOL)?, named(checks::TICKS[0])?.address());
         let index = symbol.section_index().ok_or_else(strange)?;
-        let section = file.section_by_index(index).map_err(malformed)?;
-        let bytes = section.data_range(symbol.address(), 4 * WORDS as u64).map_err(malformed)?.ok_or_else(strange)?;
+        let section = file.section_by_index(index).map_err(TargetError::malformed)?;
+        let bytes = section
+            .data_range(symbol.address(), 4 * WORDS as u64)
+            .map_err(TargetError::malformed)?
+            .ok_or_else(strange)?;
         let words: Vec<u32> = bytes.as_chunks().0.iter().map(|word| u32::from_le_bytes(*word)).collect();
         let [version, core, access, control, adc, dac, back, rest @ ..] =
             words.first_chunk::<WORDS>().ok_or_else(strange)?;

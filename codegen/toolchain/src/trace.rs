@@ -285,10 +285,9 @@ struct Code<'a> {
 
 impl<'a> Code<'a> {
     fn of(elf: &'a [u8]) -> Result<Self, TargetError> {
-        let malformed = |error: object::Error| TargetError::MalformedImage { text: error.to_string() };
-        let file = object::File::parse(elf).map_err(malformed)?;
+        let file = object::File::parse(elf).map_err(TargetError::malformed)?;
         let texts = file.sections().filter(|section| section.kind() == SectionKind::Text);
-        let sections = texts.map(|section| Ok((section.address(), section.data().map_err(malformed)?)));
+        let sections = texts.map(|section| Ok((section.address(), section.data().map_err(TargetError::malformed)?)));
         Ok(Self { sections: sections.collect::<Result<_, _>>()? })
     }
 
@@ -340,8 +339,7 @@ fn misread(text: String) -> TargetError {
 
 /// Addresses of [`MARKS`].
 fn marks(elf: &[u8]) -> Result<[u64; 4], TargetError> {
-    let malformed = |error: object::Error| TargetError::MalformedImage { text: error.to_string() };
-    let file = object::File::parse(elf).map_err(malformed)?;
+    let file = object::File::parse(elf).map_err(TargetError::malformed)?;
     let mut found = [0; 4];
     for (slot, name) in found.iter_mut().zip(MARKS) {
         let symbol = file.symbols().find(|symbol| symbol.name() == Ok(name));

@@ -95,25 +95,14 @@ fn default_step() -> f64 {
 }
 
 /// Reason why a parameter file was refused.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{file}: not a usable plant{}", findings.iter().map(|finding| format!("\n  {finding}")).collect::<String>())]
 pub struct ParameterError {
     /// The file.
     pub file: String,
     /// Every finding: field, value, what is expected.
     pub findings: Vec<String>,
 }
-
-impl fmt::Display for ParameterError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}: not a usable plant", self.file)?;
-        for finding in &self.findings {
-            write!(f, "\n  {finding}")?;
-        }
-        Ok(())
-    }
-}
-
-impl std::error::Error for ParameterError {}
 
 /// The reference leg's parameter file, as shipped.
 pub const REFERENCE_LEG: &str = include_str!("../../plants/reference-leg.json");

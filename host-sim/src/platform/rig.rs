@@ -179,13 +179,7 @@ impl PlatformRig {
                 moved += offsets[k];
             }
             let reading = self.gauges[k].read(moved);
-            let held = if reading > high {
-                high
-            } else if reading < low {
-                low
-            } else {
-                reading
-            };
+            let held = reading.clamp(low, high);
             match self.faults[k] {
                 None => self.last_readings[k] = self.signal.of(k, held),
                 Some(GaugeFault::Stuck) => {}

@@ -31,13 +31,7 @@ impl ForceSensor {
         let truth = wrench.numbers();
         std::array::from_fn(|k| {
             let reading = truth[k] + self.noise[k].draw();
-            if reading > self.range[k] {
-                self.range[k]
-            } else if reading < -self.range[k] {
-                -self.range[k]
-            } else {
-                reading
-            }
+            reading.clamp(-self.range[k], self.range[k])
         })
     }
 }

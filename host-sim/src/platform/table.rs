@@ -188,19 +188,9 @@ impl PoseTable {
         out
     }
 
-    /// Text, one line per run: rms errors, and the paper's where it has the run.
+    /// Text, one line per run: rms errors, and `beside_paper` the paper's where it has the run.
     #[must_use]
-    pub fn to_text(&self) -> String {
-        self.text(true)
-    }
-
-    /// The same without the paper's.
-    #[must_use]
-    pub fn ours_to_text(&self) -> String {
-        self.text(false)
-    }
-
-    fn text(&self, beside_paper: bool) -> String {
+    pub fn to_text(&self, beside_paper: bool) -> String {
         let mut out = String::from(
             "rms error  Hz mode        x nm    y nm    z nm norm nm rx nrad ry nrad rz nrad  over s  path s\n",
         );
@@ -230,66 +220,21 @@ fn with_norm(rms: Six) -> [f64; 7] {
     [x, y, z, norms(rms)[0], a, b, c]
 }
 
-/// The paper's tables in nm and nrad: columns 0.1, 1 and 10 Hz for each of x, y, z (5, 7) and θx, θy, θz (6, 8).
+/// The paper's tables in nm and nrad: a line per trajectory and mode, columns 0.1, 1 and 10 Hz for each of x, y, z (5, 7)
+/// and θx, θy, θz (6, 8).
 ///
 /// Rotations are printed as "n rad" and read as µrad: π/72 must be mrad for legs of 60 µm to reach it.
-const PAPER: [(&str, &str, [f64; 18]); 6] = [
-    (
-        "case-1",
-        "pf-invhys",
-        [
-            282.595, 660.4, 786.138, 281.976, 544.273, 768.052, 1730.732, 2560.3, 3149.452, 229.0, 546.0, 580.0, 622.0,
-            675.0, 1384.0, 426.0, 1365.0, 783.0,
-        ],
-    ),
-    (
-        "case-1",
-        "pf-ewma",
-        [
-            245.074, 332.574, 390.431, 279.067, 330.510, 392.128, 1093.873, 838.412, 998.552, 211.0, 307.0, 369.0,
-            453.0, 430.0, 524.0, 369.0, 430.0, 597.0,
-        ],
-    ),
-    (
-        "case-1",
-        "pf-pcc",
-        [
-            189.004, 237.211, 270.949, 214.04, 268.265, 284.321, 100.149, 531.8, 631.13, 201.0, 241.0, 287.0, 369.0,
-            397.0, 429.0, 259.0, 298.0, 325.0,
-        ],
-    ),
-    (
-        "case-2",
-        "pf-invhys",
-        [
-            85.281, 128.905, 140.329, 278.405, 304.039, 418.17, 1537.291, 2486.483, 2888.631, 1867.0, 3007.0, 3475.0,
-            1522.0, 3049.0, 3661.0, 1424.0, 1637.0, 2147.0,
-        ],
-    ),
-    (
-        "case-2",
-        "pf-ewma",
-        [
-            75.235, 85.442, 128.691, 149.682, 183.826, 224.769, 991.101, 1623.527, 1812.541, 1687.0, 1823.0, 2771.0,
-            1484.0, 2047.0, 2578.0, 576.0, 828.0, 865.0,
-        ],
-    ),
-    (
-        "case-2",
-        "pf-pcc",
-        [
-            68.236, 75.146, 102.296, 122.484, 150.953, 183.944, 812.071, 1366.833, 1389.31, 791.0, 917.0, 1351.0,
-            1398.0, 1431.0, 2101.0, 513.0, 540.0, 689.0,
-        ],
-    ),
-];
+const PAPER: &str = include_str!("paper.csv");
 
 /// The paper's rms errors of a run (nm and nrad), if it made it.
 #[must_use]
 pub fn paper_rms(trajectory: &str, mode: &str, frequency: f64) -> Option<Six> {
     let column = [0.1, 1.0, 10.0].iter().position(|f| *f == frequency)?;
-    let (.., values) = PAPER.iter().find(|(case, law, _)| *case == trajectory && *law == mode)?;
-    Some(std::array::from_fn(|axis| values[3 * axis + column]))
+    let numbers =
+        PAPER.lines().find_map(|line| line.strip_prefix(trajectory)?.strip_prefix(',')?.strip_prefix(mode))?;
+    let numbers: Vec<f64> =
+        numbers.strip_prefix(',')?.split(',').skip(column).step_by(3).flat_map(str::parse).collect();
+    numbers.try_into().ok()
 }
 
 /// One machining run, a cell of Table 9.
@@ -371,20 +316,10 @@ impl MachiningTable {
         out
     }
 
-    /// Text, one line per run, with the paper's figures where it has them. Its orientations are those of the print: at or below
-    /// what its own gauges can see (2.2 nm on ±80 mm is 20 nrad).
+    /// Text, one line per run, and `beside_paper` with the paper's figures where it has them. Its orientations are those of the
+    /// print: at or below what its own gauges can see (2.2 nm on ±80 mm is 20 nrad).
     #[must_use]
-    pub fn to_text(&self) -> String {
-        self.text(true)
-    }
-
-    /// The same without the paper's.
-    #[must_use]
-    pub fn ours_to_text(&self) -> String {
-        self.text(false)
-    }
-
-    fn text(&self, beside_paper: bool) -> String {
+    pub fn to_text(&self, beside_paper: bool) -> String {
         let mut out = String::from("mean error norm            nm      nrad  over s  path s");
         out.push_str(if beside_paper { "   paper nm      nrad\n" } else { "\n" });
         for row in &self.rows {
@@ -439,10 +374,10 @@ mod tests {
         let mut table = PoseTable::default();
         table.rows.push(PoseRow::of("case-1", "pf-pcc", 10.0, &errors()));
         table.rows.push(PoseRow::of("case-3", "pf-pcc", 10.0, &errors()));
-        let text = table.to_text();
+        let text = table.to_text(true);
         let lines: Vec<&str> = text.lines().collect();
         assert_eq!(lines.len(), 4, "{text}");
-        assert!(!table.ours_to_text().contains("paper"));
+        assert!(!table.to_text(false).contains("paper"));
         assert!(lines[2].contains("paper") && lines[2].contains("631") && lines[2].ends_with("325"), "{text}");
         assert!(lines[1].ends_with("   1.500   1.500"), "{text}");
         let csv = table.to_csv();
@@ -459,7 +394,7 @@ mod tests {
         table.push("glass", "pf-pcc", &errors());
         assert_eq!(table.ratio("glass", "p", "pf-pcc"), Some([1.0, 1.0]));
         assert_eq!(table.ratio("aluminium", "p", "pf-pcc"), None);
-        let text = table.to_text();
+        let text = table.to_text(true);
         assert!(text.lines().nth(1).unwrap().ends_with("5702      28.0"), "{text}");
         assert!((PAPER_MACHINING[0].2 / PAPER_MACHINING[1].2 - 5.77).abs() < 0.01);
     }

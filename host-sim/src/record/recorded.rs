@@ -1,10 +1,10 @@
 //! A supervised controller with a recorder: it closes the loop of any scenario.
 
-use std::io;
+use std::io::{self, Write};
 
 use specgen_runtime::recorder::{Recorder, Row};
 
-use super::Taker;
+use super::Writer;
 use crate::controller::{ControllerError, MachineWord, Supervised, TickController};
 use crate::description::Description;
 
@@ -41,10 +41,10 @@ pub enum RecordingEnd {
 ///
 /// After a failure it outputs voltages that are not finite, which ends any scenario at once;
 /// [`RecordedController::ended`] has the reason.
-pub struct RecordedController<'r, 'm> {
+pub struct RecordedController<'r, 'm, W> {
     machine: Supervised,
     recorder: &'r mut Recorder<'m>,
-    taker: &'r mut dyn Taker,
+    writer: &'r mut Writer<W>,
     config: Vec<u64>,
     input: Vec<u64>,
     output: Vec<u64>,
@@ -56,15 +56,15 @@ pub struct RecordedController<'r, 'm> {
     ended: Option<RecordingEnd>,
 }
 
-impl<'r, 'm> RecordedController<'r, 'm> {
-    /// Records `machine`; `recorder` must be started as a stream, and its blocks go to `taker`.
+impl<'r, 'm, W: Write> RecordedController<'r, 'm, W> {
+    /// Records `machine`; `recorder` must be started as a stream, and its blocks go to `writer`.
     ///
     /// # Errors
     /// If the controller has no codes or no status.
     pub fn new(
         machine: Supervised,
         recorder: &'r mut Recorder<'m>,
-        taker: &'r mut dyn Taker,
+        writer: &'r mut Writer<W>,
     ) -> Result<Self, ControllerError> {
         let description = machine.controller().description();
         let codes = description.outputs("dac_code")?;
@@ -76,7 +76,7 @@ impl<'r, 'm> RecordedController<'r, 'm> {
             output: vec![0; machine.output_names().len()],
             machine,
             recorder,
-            taker,
+            writer,
             codes,
             status,
             supervisor,
@@ -110,7 +110,7 @@ impl<'r, 'm> RecordedController<'r, 'm> {
             }
         }
         self.recorder.stop();
-        self.taker.drain(self.recorder).map_err(RecordingEnd::Io)
+        self.writer.drain(self.recorder).map_err(RecordingEnd::Io)
     }
 
     /// One tick with this request.
@@ -137,7 +137,7 @@ impl<'r, 'm> RecordedController<'r, 'm> {
         };
         let machine = &self.machine;
         self.recorder.push(&self.input, &row, || machine.digest());
-        self.taker.drain(self.recorder).map_err(RecordingEnd::Io)?;
+        self.writer.drain(self.recorder).map_err(RecordingEnd::Io)?;
         Ok(word)
     }
 
@@ -166,7 +166,7 @@ impl<'r, 'm> RecordedController<'r, 'm> {
     }
 }
 
-impl TickController for RecordedController<'_, '_> {
+impl<W: Write> TickController for RecordedController<'_, '_, W> {
     fn description(&self) -> &Description {
         self.machine.controller().description()
     }

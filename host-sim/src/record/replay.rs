@@ -72,11 +72,16 @@ pub struct PhaseChange {
 }
 
 /// Reason why a record cannot be replayed.
-#[derive(Debug)]
+#[derive(Debug, thiserror::Error)]
 pub enum ReplayError {
     /// It is no record.
-    Record(RecordError),
+    #[error(transparent)]
+    Record(#[from] RecordError),
     /// It belongs to another controller: the differing line of the description, in the record and in the library.
+    #[error(
+        "the record is of another controller: {field} {recorded}, the spec gives {library}; name the spec that the target \
+         was built from, and the specgen version that built it"
+    )]
     Other {
         /// What differs.
         field: &'static str,
@@ -86,35 +91,13 @@ pub enum ReplayError {
         library: String,
     },
     /// Ticks are left out.
+    #[error(
+        "only every {0}th tick is in the record, so it cannot be replayed; record with decimation 1 (--csv exports it as it is)"
+    )]
     Decimated(u32),
     /// The controller refuses the recorded settings.
+    #[error("settings at tick {0}: {1}")]
     Config(u64, ControllerError),
-}
-
-impl fmt::Display for ReplayError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Record(error) => error.fmt(f),
-            Self::Other { field, recorded, library } => write!(
-                f,
-                "the record is of another controller: {field} {recorded}, the spec gives {library}; name the spec that the target \
-                 was built from, and the specgen version that built it"
-            ),
-            Self::Decimated(every) => write!(
-                f,
-                "only every {every}th tick is in the record, so it cannot be replayed; record with decimation 1 (--csv exports it as it is)"
-            ),
-            Self::Config(tick, error) => write!(f, "settings at tick {tick}: {error}"),
-        }
-    }
-}
-
-impl std::error::Error for ReplayError {}
-
-impl From<RecordError> for ReplayError {
-    fn from(error: RecordError) -> Self {
-        Self::Record(error)
-    }
 }
 
 /// Replays a record on `machine` and calls `each` with every block and the output words of the replayed rows.
@@ -252,32 +235,28 @@ impl Run<'_> {
         self.given.push(self.output.clone());
         self.found.ticks += 1;
         let description = crate::controller::TickController::description(self.machine.controller());
-        let word = |name: &str| description.output(name).ok().and_then(|place| self.output.get(place)).copied();
-        let differs = |signal: String, recorded: u64, replayed: u64| {
+        let at = |place: usize| self.output.get(place).copied().unwrap_or(u64::MAX);
+        let word = |name: &str| description.output(name).map_or(u64::MAX, at);
+        let codes = (0..).zip(row.codes).map(|(leg, code): (u32, i32)| {
+            let name = format!("dac_code[{leg}]");
+            (name.clone(), u64::from(code as u32), word(&name))
+        });
+        let status = ("status".to_owned(), u64::from(row.status), word("status"));
+        let supervisor = [u64::from(row.supervisor), at(description.output_names.len() + SUPERVISOR)];
+        let parts = [("phase", 0), ("cause", 8), ("amplifiers_on", 16)].map(|(name, shift)| {
+            let [recorded, replayed] = supervisor.map(|word| word >> shift & 0xff);
+            (name.to_owned(), recorded, replayed)
+        });
+        let differs = |(signal, recorded, replayed): (String, u64, u64)| {
             (recorded != replayed).then_some(Divergence { tick: row.tick, signal, recorded, replayed })
         };
-        for (leg, code) in row.codes.iter().enumerate() {
-            let name = format!("dac_code[{leg}]");
-            let found = differs(name.clone(), u64::from(*code as u32), word(&name).unwrap_or(u64::MAX));
-            if found.is_some() {
-                return found;
-            }
-        }
-        let found = differs("status".to_owned(), u64::from(row.status), word("status").unwrap_or(u64::MAX));
+        let found = codes.chain([status]).chain(parts).find_map(differs);
         if found.is_some() {
             return found;
         }
-        let supervisor = self.output.get(description.output_names.len() + SUPERVISOR).copied().unwrap_or(u64::MAX);
-        for (name, shift) in [("phase", 0), ("cause", 8), ("amplifiers_on", 16)] {
-            let part = |word: u64| word >> shift & 0xff;
-            let found = differs(name.to_owned(), part(u64::from(row.supervisor)), part(supervisor));
-            if found.is_some() {
-                return found;
-            }
-        }
         let digest = row.digest?;
         self.found.digests += 1;
-        differs("state_digest".to_owned(), digest, self.machine.digest())
+        differs(("state_digest".to_owned(), digest, self.machine.digest()))
     }
 
     fn note_phase(&mut self, row: &Row) {

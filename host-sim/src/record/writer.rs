@@ -5,27 +5,6 @@ use std::io::{self, Write};
 use specgen_runtime::record::{write_block, write_header};
 use specgen_runtime::recorder::Recorder;
 
-/// Receives closed blocks.
-pub trait Taker {
-    /// Takes a block.
-    ///
-    /// # Errors
-    /// It cannot be kept.
-    fn take(&mut self, block: &[u64]) -> io::Result<()>;
-
-    /// Writes all closed blocks of a recorder, and releases them.
-    ///
-    /// # Errors
-    /// As [`Taker::take`]; blocks that were written are released.
-    fn drain(&mut self, recorder: &mut Recorder<'_>) -> io::Result<()> {
-        while let Some(block) = recorder.block(0) {
-            self.take(block)?;
-            recorder.release();
-        }
-        Ok(())
-    }
-}
-
 /// Writes a record to a file.
 pub struct Writer<W> {
     sink: W,
@@ -41,18 +20,11 @@ impl<W: Write> Writer<W> {
         Ok(Self { sink })
     }
 
-    /// The sink, flushed.
+    /// Writes a closed block.
     ///
     /// # Errors
-    /// It cannot be flushed.
-    pub fn finish(mut self) -> io::Result<W> {
-        self.sink.flush()?;
-        Ok(self.sink)
-    }
-}
-
-impl<W: Write> Taker for Writer<W> {
-    fn take(&mut self, block: &[u64]) -> io::Result<()> {
+    /// If the sink fails.
+    pub fn take(&mut self, block: &[u64]) -> io::Result<()> {
         let mut bytes = Vec::with_capacity(block.len() * 8 + 8);
         // Into memory, which cannot fail: a file then needs a single write.
         let Ok(()) = write_block(block, |piece| {
@@ -60,5 +32,26 @@ impl<W: Write> Taker for Writer<W> {
             Ok::<(), std::convert::Infallible>(())
         });
         self.sink.write_all(&bytes)
+    }
+
+    /// Writes all closed blocks of a recorder, and releases them.
+    ///
+    /// # Errors
+    /// As [`Writer::take`]; blocks that were written are released.
+    pub fn drain(&mut self, recorder: &mut Recorder<'_>) -> io::Result<()> {
+        while let Some(block) = recorder.block(0) {
+            self.take(block)?;
+            recorder.release();
+        }
+        Ok(())
+    }
+
+    /// The sink, flushed.
+    ///
+    /// # Errors
+    /// It cannot be flushed.
+    pub fn finish(mut self) -> io::Result<W> {
+        self.sink.flush()?;
+        Ok(self.sink)
     }
 }

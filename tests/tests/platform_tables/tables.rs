@@ -72,12 +72,12 @@ fn tables_5_to_9_on_the_reference_machine() {
         let run = bench.scenario().free_motion(&mut bench.controller(), &best, &named).expect("a run");
         table.rows.extend(run.rows);
     }
-    println!("{}", table.to_text());
+    println!("{}", table.to_text(true));
     let found = translation(&table, "case-1", "pf-pcc", 1.0);
     println!("P+PCC, case 1 at 1 Hz: {found:.2} nm (at most 4)");
     assert!(found <= 4.0, "{found} nm");
     let table = machining(bench);
-    println!("{}", table.to_text());
+    println!("{}", table.to_text(true));
     for (part, _) in PARTS.into_iter().take(length(1, 2)) {
         let row = table.row(part, "pf-pcc").expect("the run was made");
         assert!(row.translation_nm <= 3.0 && row.orientation_nrad <= 25.0, "{row:?}");

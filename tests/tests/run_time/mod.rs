@@ -8,7 +8,7 @@ use std::io::Cursor;
 
 use crate::rate_options::{CREEP, DYNAMIC, rate_table};
 use host_sim::controller::{Controller, RestingReadings, Supervised, TickController as _};
-use host_sim::record::{Reader, Taker as _, Writer, replay};
+use host_sim::record::{Reader, Writer, replay};
 use host_sim::trace::first_difference;
 use oracle::stimulus::InputRecording;
 use rand_chacha::ChaCha8Rng;

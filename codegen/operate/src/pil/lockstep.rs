@@ -1,6 +1,5 @@
 //! Two controllers as one: the host library and a device on the link, stepped with the same words and compared bit for bit.
 
-use std::fmt;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
@@ -26,13 +25,16 @@ const ARM: u64 = 1;
 const RUN: u64 = 2;
 
 /// Why a run ended early.
-#[derive(Debug)]
+#[derive(Debug, thiserror::Error)]
 pub enum Stop {
     /// Host and device differ.
+    #[error("{0}")]
     Difference(Difference),
     /// The link failed.
+    #[error(transparent)]
     Link(ClientError),
     /// The supervisor does not reach the running phase, or leaves it.
+    #[error("tick {tick}: the machine is {word} instead of running; host and device agree")]
     Supervisor {
         /// Tick since power-up.
         tick: u64,
@@ -40,23 +42,11 @@ pub enum Stop {
         word: MachineWord,
     },
     /// The host's controller refuses the settings.
+    #[error(transparent)]
     Settings(ControllerError),
     /// Interrupted by the user.
+    #[error("interrupted")]
     Interrupted,
-}
-
-impl fmt::Display for Stop {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Difference(difference) => difference.fmt(f),
-            Self::Link(error) => error.fmt(f),
-            Self::Supervisor { tick, word } => {
-                write!(f, "tick {tick}: the machine is {word} instead of running; host and device agree")
-            }
-            Self::Settings(error) => error.fmt(f),
-            Self::Interrupted => f.write_str("interrupted"),
-        }
-    }
 }
 
 /// Cost of a stage of the tick on the device.

@@ -18,7 +18,7 @@ use super::difference::Difference;
 use super::lockstep::Cost;
 
 /// The report of a processor-in-the-loop run.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Default, Serialize)]
 pub struct Report {
     /// Name of the spec.
     pub name: String,
@@ -78,22 +78,9 @@ impl Report {
             name: compiled.ir.name.clone(),
             digest: compiled.ir.digest.clone(),
             device,
-            ticks: 0,
-            first_difference: None,
             interval: compiled.model.timing.period,
-            seconds: 0.0,
-            waited: Duration::ZERO,
-            damaged_frames: 0,
-            counted: "",
-            costs: Vec::new(),
             stack_bound,
-            tracking: TrackingTable::default(),
-            free_motion: PoseTable::default(),
-            machining: Value::Null,
-            on_board: None,
-            ended_early: Vec::new(),
-            errors: String::new(),
-            plot: None,
+            ..Self::default()
         }
     }
 
@@ -106,13 +93,13 @@ impl Report {
 
     /// Puts the table of free motion before other errors.
     pub(super) fn write_free_motion(&mut self) {
-        let text = self.free_motion.ours_to_text();
+        let text = self.free_motion.to_text(false);
         self.errors.insert_str(0, &text);
     }
 
     /// Puts the table of work parts before other errors.
     pub(super) fn write_machining(&mut self, table: &MachiningTable) {
-        self.errors.insert_str(0, &table.ours_to_text());
+        self.errors.insert_str(0, &table.to_text(false));
         self.machining = serde_json::json!(table);
     }
 

@@ -1,33 +1,18 @@
 //! Opens a session with a device, and reads its description.
 
-use std::fmt;
-
 use host_sim::description::Description;
 use specgen_link::client::{Client, ClientError, Port, Timeout};
 use specgen_link::{Identity, Request};
 
 /// Why there is no session.
-#[derive(Debug)]
+#[derive(Debug, thiserror::Error)]
 pub enum OpenError {
     /// The link does not open.
-    Link(ClientError),
+    #[error(transparent)]
+    Link(#[from] ClientError),
     /// There is something else at its other end.
+    #[error("{0}")]
     Other(String),
-}
-
-impl fmt::Display for OpenError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Link(error) => error.fmt(f),
-            Self::Other(text) => f.write_str(text),
-        }
-    }
-}
-
-impl From<ClientError> for OpenError {
-    fn from(error: ClientError) -> Self {
-        Self::Link(error)
-    }
 }
 
 /// A session that was opened, with the device's own description.

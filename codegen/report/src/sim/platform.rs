@@ -294,8 +294,8 @@ impl Experiment<'_> {
         self.tables.push(("machining.csv".to_owned(), machining.to_csv().into_bytes()));
         let text = format!(
             "Tables 5 to 8, with the paper's values (its angles interpreted as µrad)\n{}Table 9, machining at {MACHINING_FREQUENCY} Hz\n{}",
-            free.to_text(),
-            machining.to_text()
+            free.to_text(true),
+            machining.to_text(true)
         );
         Ok(Results::Tables { free_motion: free.rows, machining: machining.rows, text })
     }

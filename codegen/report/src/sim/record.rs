@@ -190,7 +190,7 @@ fn platform(
     options: &Options,
     compiled: &Compilation,
     task: &TaskSpace,
-    controller: &mut RecordedController<'_, '_>,
+    controller: &mut dyn TickController,
     mut wave: Wave<f64>,
     ticks: u64,
 ) -> Result<(), RunError> {
@@ -210,7 +210,7 @@ fn platform(
 fn legs(
     options: &Options,
     compiled: &Compilation,
-    controller: &mut RecordedController<'_, '_>,
+    controller: &mut dyn TickController,
     wave: Wave<f64>,
     seconds: f64,
 ) -> Result<(), RunError> {

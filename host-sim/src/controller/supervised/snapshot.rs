@@ -1,13 +1,12 @@
 //! A machine as words and back.
 
-use std::fmt;
-
 use super::Supervised;
 
 /// Reason why words are not a valid machine.
-#[derive(Debug)]
+#[derive(Debug, thiserror::Error)]
 pub enum SnapshotError {
     /// Their number differs from that of this controller's machine.
+    #[error("a state of {given} words; this controller's has {expected}")]
     Length {
         /// How many.
         given: usize,
@@ -15,6 +14,7 @@ pub enum SnapshotError {
         expected: usize,
     },
     /// An invalid word.
+    #[error("word {index} of the state is {word:016x}, which is invalid")]
     Word {
         /// Its index.
         index: usize,
@@ -22,17 +22,6 @@ pub enum SnapshotError {
         word: u64,
     },
 }
-
-impl fmt::Display for SnapshotError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Length { given, expected } => write!(f, "a state of {given} words; this controller's has {expected}"),
-            Self::Word { index, word } => write!(f, "word {index} of the state is {word:016x}, which is invalid"),
-        }
-    }
-}
-
-impl std::error::Error for SnapshotError {}
 
 impl Supervised {
     /// Words of [`Supervised::save`].

@@ -26,25 +26,20 @@ pub const NOT_FOLLOWED: u32 = 3 << 16;
 pub enum Command {
     /// Stay.
     #[default]
-    Hold,
+    Hold = 0,
     /// Follow the set-points of the words.
-    Stream,
+    Stream = 1,
     /// Go to the set-point.
-    Move,
+    Move = 2,
     /// Run the trajectory of the selector.
-    Trajectory,
+    Trajectory = 3,
 }
 
 impl Command {
     /// Its word.
     #[must_use]
     pub fn word(self) -> u64 {
-        match self {
-            Self::Hold => 0,
-            Self::Stream => 1,
-            Self::Move => 2,
-            Self::Trajectory => 3,
-        }
+        self as u64
     }
 }
 

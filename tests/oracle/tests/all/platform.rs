@@ -34,7 +34,7 @@ fn case_1_at_10_hz_and_machining_have_the_figures_of_the_study() {
     let case = PaperPose::corrected(PaperPath::Case1, 10.0);
     let named = [NamedTrajectory { name: "case-1", frequency: 10.0, trajectory: &case }];
     let table = scenario.free_motion(&mut controller, &FREE_MODES, &named).unwrap();
-    println!("{}", table.to_text());
+    println!("{}", table.to_text(true));
     let row = |mode| table.row("case-1", mode, 10.0).unwrap();
     // Study, base N: Invhys 67/71/21, EWMA 14.2/22.0/4.7, PCC 14.0/22.0/4.7 nm, on legs with other tolerances.
     for (mode, study) in [("pf-invhys", 99.9), ("pf-ewma", 26.6), ("pf-pcc", 26.5)] {
@@ -51,7 +51,7 @@ fn case_1_at_10_hz_and_machining_have_the_figures_of_the_study() {
     let table = scenario
         .machining(&mut controller, &MACHINING_MODES, &parts, &PaperPose::corrected(PaperPath::Machining, 1.0))
         .unwrap();
-    println!("{}", table.to_text());
+    println!("{}", table.to_text(true));
     let combined = table.row("glass", "pf-pcc").unwrap();
     let [translation, orientation] = table.ratio("glass", "p", "pf-pcc").unwrap();
     assert!(combined.translation_nm < 3.0 && combined.orientation_nrad < 25.0, "{table:?}");
