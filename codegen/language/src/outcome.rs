@@ -17,8 +17,10 @@ const INTERRUPTED: u8 = 130;
 
 /// The result of a command: text for people, its fields for the JSON document.
 pub trait Outcome: Serialize {
-    /// The text, whole lines.
-    fn text(&self) -> String;
+    /// The text, whole lines; none if it has only fields, or its text was printed earlier.
+    fn text(&self) -> String {
+        String::new()
+    }
 }
 
 /// JSON is its own text.

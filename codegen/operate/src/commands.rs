@@ -53,11 +53,7 @@ pub struct Service {
     pub stands: String,
 }
 
-impl Outcome for Service {
-    fn text(&self) -> String {
-        String::new()
-    }
-}
+impl Outcome for Service {}
 
 impl Source {
     /// Parses every command before anything is sent to the machine: an error in the last line stops the first.

@@ -63,10 +63,7 @@ impl MachineSource for OnLine<'_> {
         let mut machine = LinkedMachine { operator: &mut operator, ui, own: &self.own, has: None, error: None };
         let done = match machine.arm() {
             Ok(()) => work(&mut machine, ui),
-            Err(error) => {
-                machine.error = Some(error);
-                Err(LearnError::Ended)
-            }
+            Err(error) => Err(machine.ended(error)),
         };
         let ending = machine.error;
         let down = match &ending {

@@ -32,6 +32,16 @@ const COMMANDS: [&str; 4] = ["hold", "stream", "move", "trajectory"];
 /// Words of a pose.
 const POSE: usize = 6;
 
+/// The content of a reply of the expected kind, or [`ClientError::Unexpected`].
+macro_rules! expect {
+    ($reply:expr, $kind:pat => $content:expr) => {
+        match $reply {
+            $kind => Ok($content),
+            _ => Err(ClientError::Unexpected),
+        }
+    };
+}
+
 /// Place of a platform, m and rad.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Place {
@@ -104,18 +114,7 @@ impl<P: Port> Session<P> {
             motion,
             command: vec![0; words],
             asked: Instant::now(),
-            status: Status {
-                tick: 0,
-                phase: 0,
-                cause: 0,
-                finding: 0,
-                amplifier_on: false,
-                status: 0,
-                events: 0,
-                late: 0,
-                age: None,
-                link: specgen_link::Counters::NONE,
-            },
+            status: Status::default(),
         };
         session.poll()?;
         Ok(session)
@@ -164,15 +163,10 @@ impl<P: Port> Session<P> {
     /// # Errors
     /// As [`Client::ask`], here and below.
     pub fn poll(&mut self) -> Result<&Status, ClientError> {
-        match self.client.ask(&Request::Status)? {
-            Reply::Status(status) => {
-                self.status = status;
-                self.asked = Instant::now();
-                self.forget(status.phase);
-                Ok(&self.status)
-            }
-            _ => Err(ClientError::Unexpected),
-        }
+        self.status = expect!(self.client.ask(&Request::Status)?, Reply::Status(status) => status)?;
+        self.asked = Instant::now();
+        self.forget(self.status.phase);
+        Ok(&self.status)
     }
 
     /// Place of the platform; none for six legs. A heartbeat.
@@ -204,10 +198,7 @@ impl<P: Port> Session<P> {
 
     /// Health of the device; this clears its events.
     pub fn health(&mut self) -> Result<Health, ClientError> {
-        match self.client.ask(&Request::Health)? {
-            Reply::Health(health) => Ok(health),
-            _ => Err(ClientError::Unexpected),
-        }
+        expect!(self.client.ask(&Request::Health)?, Reply::Health(health) => health)
     }
 
     /// Time since the last request.
@@ -227,10 +218,7 @@ impl<P: Port> Session<P> {
     }
 
     pub(crate) fn done(&mut self, request: &Request<'_>) -> Result<(), ClientError> {
-        match self.client.ask(request)? {
-            Reply::Done => Ok(()),
-            _ => Err(ClientError::Unexpected),
-        }
+        expect!(self.client.ask(request)?, Reply::Done => ())
     }
 
     /// Sends a request to the supervisor; it stays in effect until the next one.
@@ -289,10 +277,7 @@ impl<P: Port> Session<P> {
 
     /// State of the input line. With `drop`, the waiting command is cancelled first.
     pub fn edge(&mut self, drop: bool) -> Result<EdgeStatus, ClientError> {
-        match self.client.ask(&Request::Edge { drop })? {
-            Reply::Edge(status) => Ok(status),
-            _ => Err(ClientError::Unexpected),
-        }
+        expect!(self.client.ask(&Request::Edge { drop })?, Reply::Edge(status) => status)
     }
 
     /// Words of a move to `pose`, m and rad.
@@ -308,10 +293,8 @@ impl<P: Port> Session<P> {
     /// The settings in force.
     pub fn config(&mut self) -> Result<Vec<u64>, ClientError> {
         let count = usize::from(self.identity.config_words);
-        match self.client.ask(&Request::ReadConfig)? {
-            Reply::Config { words } => words.words(count).map(Iterator::collect).ok_or(ClientError::Unexpected),
-            _ => Err(ClientError::Unexpected),
-        }
+        let words = expect!(self.client.ask(&Request::ReadConfig)?, Reply::Config { words } => words)?;
+        words.words(count).map(Iterator::collect).ok_or(ClientError::Unexpected)
     }
 
     /// Replaces all settings at once.
@@ -335,10 +318,7 @@ impl<P: Port> Session<P> {
 
     fn recorder_status(&mut self, action: RecorderAction) -> Result<RecorderStatus, ClientError> {
         self.asked = Instant::now();
-        match self.client.ask(&Request::Recorder { action })? {
-            Reply::Recorder(status) => Ok(status),
-            _ => Err(ClientError::Unexpected),
-        }
+        expect!(self.client.ask(&Request::Recorder { action })?, Reply::Recorder(status) => status)
     }
 
     /// Appends the next piece of the record; true if it is complete. A heartbeat.
@@ -361,10 +341,7 @@ impl<P: Port> Session<P> {
 
     /// Performs an action of the pass player and returns the state after it.
     pub fn pass(&mut self, action: PassAction) -> Result<PassStatus, ClientError> {
-        match self.client.ask(&Request::Pass { action })? {
-            Reply::Pass(status) => Ok(status),
-            _ => Err(ClientError::Unexpected),
-        }
+        expect!(self.client.ask(&Request::Pass { action })?, Reply::Pass(status) => status)
     }
 
     /// The error recorded by the last pass.

@@ -149,20 +149,14 @@ fn place_of(word: usize) -> String {
 #[must_use]
 pub fn refused_wave(word: u16) -> String {
     let name = |axis: usize| AXES.get(axis).map_or_else(|| axis.to_string(), |name| format!("{name} (leg {axis})"));
+    let too_fast = |axis, what| {
+        let axis = name(axis);
+        format!("axis {axis} would exceed the {what} of a stream: reduce amplitude or frequency, or use a longer ramp")
+    };
     match Refusal::of_word(usize::from(word)) {
         Refusal::Range(axis) => format!("axis {} would leave its range: reduce amplitude or offset", name(axis)),
-        Refusal::Rate(axis) => {
-            format!(
-                "axis {} would exceed the speed of a stream: reduce amplitude or frequency, or use a longer ramp",
-                name(axis)
-            )
-        }
-        Refusal::Acceleration(axis) => {
-            format!(
-                "axis {} would exceed the acceleration of a stream: reduce amplitude or frequency, or use a longer ramp",
-                name(axis)
-            )
-        }
+        Refusal::Rate(axis) => too_fast(axis, "speed"),
+        Refusal::Acceleration(axis) => too_fast(axis, "acceleration"),
         Refusal::Word(_) | Refusal::Busy => format!("{} is invalid", place_of(usize::from(word))),
     }
 }

@@ -330,7 +330,7 @@ pub struct Identity {
 }
 
 /// Status of a device.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Status {
     /// Ticks since power-up.
     pub tick: u64,

@@ -478,12 +478,17 @@ impl<P: Port> Operator<P> {
                 theirs.scalar.bits()
             )));
         }
-        let words = words.clone();
-        self.session.write_config(&words).map_err(|error| match error {
+        let of = path.display();
+        self.configure(words, |name| format!("the device refused `{name}` of {of}: out of its range"))
+    }
+
+    /// Sends all settings. `refused` is the message about a setting of this name that the device refuses.
+    pub(super) fn configure(&mut self, words: &[u64], refused: impl Fn(&str) -> String) -> Result<(), SessionError> {
+        self.in_control = true;
+        self.session.write_config(words).map_err(|error| match error {
             ClientError::Refused(Refusal::Word { index }) => {
-                let names = &self.session.description().config_names;
-                let name = names.get(usize::from(index)).map_or("?", String::as_str);
-                SessionError::Refused(format!("the device refused `{name}` of {}: out of its range", path.display()))
+                let name = self.session.description().config_names.get(usize::from(index));
+                SessionError::Refused(refused(name.map_or("?", String::as_str)))
             }
             other => other.into(),
         })

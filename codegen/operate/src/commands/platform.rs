@@ -11,8 +11,7 @@ use host_sim::word::status_words;
 use serde::Serialize;
 use specgen_compiler::compile;
 use specgen_language::model::Gains;
-use specgen_link::Refusal;
-use specgen_link::client::{ClientError, Port};
+use specgen_link::client::Port;
 use specgen_runtime::setpoint::{BUSY, REFUSED, STALE};
 use specgen_runtime::supervisor::{Cause, Phase};
 
@@ -110,6 +109,10 @@ impl Outcome for GainsInForce {
         }
         text
     }
+}
+
+fn beyond_range(name: &str) -> String {
+    format!("the device refused `{name}`: out of its range")
 }
 
 /// Whether a setting is a gain.
@@ -313,7 +316,7 @@ impl<P: Port> Operator<P> {
         if let Some(slot) = place.and_then(|place| words.get_mut(place)) {
             *slot = mode;
         }
-        self.configure(&words)
+        self.configure(&words, beyond_range)
     }
 
     /// Checks the stability margins of the gains, then sends them. Returns λ up to which every mode is stable.
@@ -338,21 +341,9 @@ impl<P: Port> Operator<P> {
             let texts: Vec<String> = findings.iter().map(|one| format!("{}: {}", one.code, one.message)).collect();
             SessionError::Refused(format!("not sent: {}", texts.join("; ")))
         })?;
-        self.configure(&words)?;
+        self.configure(&words, beyond_range)?;
         let limits = design.1.iter().flat_map(|design| &design.margins).filter_map(|mode| mode.gain_ratio_limit);
         Ok(limits.reduce(|least, limit| if limit < least { limit } else { least }))
-    }
-
-    fn configure(&mut self, words: &[u64]) -> Result<(), SessionError> {
-        self.in_control = true;
-        self.session.write_config(words).map_err(|error| match error {
-            ClientError::Refused(Refusal::Word { index }) => {
-                let names = &self.session.description().config_names;
-                let name = names.get(usize::from(index)).map_or("?", String::as_str);
-                SessionError::Refused(format!("the device refused `{name}`: out of its range"))
-            }
-            other => other.into(),
-        })
     }
 
     /// Suggested next step, by phase, cause and status.

@@ -73,16 +73,9 @@ impl<P: Port> Operator<P> {
                 *slot = word;
             }
         }
-        match self.session.write_config(&words) {
-            Err(ClientError::Refused(Refusal::Word { index })) => {
-                let names = &self.session.description().config_names;
-                let name = names.get(usize::from(index)).map_or("?", String::as_str);
-                Err(SessionError::Refused(format!(
-                    "`{name}` is out of its range (docs/triggers.md); the settings are unchanged"
-                )))
-            }
-            other => Ok(other?),
-        }
+        let refused =
+            |name: &str| format!("`{name}` is out of its range (docs/triggers.md); the settings are unchanged");
+        self.configure(&words, refused)
     }
 
     /// Queues a move, a trajectory or a wave for the next edge of the input line.

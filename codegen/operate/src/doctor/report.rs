@@ -83,29 +83,21 @@ impl Outcome for Report {
 }
 
 fn management(measured: &LatencyMeasurement) -> Finding {
-    let subject = "firmware";
+    const SUBJECT: &str = "firmware";
     match measured.management_interrupts {
-        Some(0) => Finding {
-            subject,
-            grade: Grade::Good,
-            found: "no system management interrupts during the measurement".to_owned(),
-            fix: None,
-        },
-        Some(count) => Finding {
-            subject,
-            grade: Grade::Warning,
-            found: format!("{count} system management interrupts during the measurement"),
-            fix: Some("disable USB legacy support, sensors and power management in the firmware set-up".to_owned()),
-        },
-        None => Finding {
-            subject,
-            grade: Grade::Unknown,
-            found: "system management interrupts are not counted here".to_owned(),
-            fix: Some(
-                "on an Intel processor, run `modprobe msr` as root and repeat; `hwlatdetect` finds other causes"
-                    .to_owned(),
-            ),
-        },
+        Some(0) => Finding::good(SUBJECT, "no system management interrupts during the measurement"),
+        Some(count) => Finding::of(
+            SUBJECT,
+            Grade::Warning,
+            format!("{count} system management interrupts during the measurement"),
+            "disable USB legacy support, sensors and power management in the firmware set-up",
+        ),
+        None => Finding::of(
+            SUBJECT,
+            Grade::Unknown,
+            "system management interrupts are not counted here",
+            "on an Intel processor, run `modprobe msr` as root and repeat; `hwlatdetect` finds other causes",
+        ),
     }
 }
 

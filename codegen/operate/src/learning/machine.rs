@@ -87,6 +87,12 @@ impl<P: Port> LinkedMachine<'_, P> {
         }
         self.operator.execute(&wait(WaitCondition::Arrived), self.ui)
     }
+
+    /// Keeps the error that ended a pass.
+    pub fn ended(&mut self, error: SessionError) -> LearnError {
+        self.error = Some(error);
+        LearnError::Ended
+    }
 }
 
 impl<P: Port> RepeatableMachine for LinkedMachine<'_, P> {
@@ -100,10 +106,7 @@ impl<P: Port> RepeatableMachine for LinkedMachine<'_, P> {
                 let measured = held(&passed.errors, spacing, motion.corrected);
                 Ok(PassObservation { real: measured.clone(), measured, kept: passed.errors, status: passed.status })
             }
-            Err(error) => {
-                self.error = Some(error);
-                Err(LearnError::Ended)
-            }
+            Err(error) => Err(self.ended(error)),
         }
     }
 
@@ -118,10 +121,7 @@ impl<P: Port> RepeatableMachine for LinkedMachine<'_, P> {
                 Ok(made)
             }
             Ok(_) => Err(LearnError::Refused),
-            Err(error) => {
-                self.error = Some(error);
-                Err(LearnError::Ended)
-            }
+            Err(error) => Err(self.ended(error)),
         }
     }
 
@@ -130,9 +130,7 @@ impl<P: Port> RepeatableMachine for LinkedMachine<'_, P> {
         if self.has.as_deref() == Some(knots) {
             return Ok(());
         }
-        self.operator.correct(knots, course(motion, spacing, self.own.number)).map_err(|error| {
-            self.error = Some(error);
-            LearnError::Ended
-        })
+        let course = course(motion, spacing, self.own.number);
+        self.operator.correct(knots, course).map_err(|error| self.ended(error))
     }
 }
