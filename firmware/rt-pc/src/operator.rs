@@ -380,7 +380,7 @@ impl Operator {
     fn assignment(&self, text: &str) -> Result<(usize, u64), String> {
         let (name, value) =
             text.split_once('=').ok_or_else(|| format!("expected NAME=VALUE such as `command=3`, found `{text}`"))?;
-        let place = place(name).map_err(|error| error.to_string())?;
+        let place = place(name)?;
         if place >= COMMAND_WORDS {
             let free = MACHINE_INPUT_NAMES[..COMMAND_WORDS].join(", ");
             return Err(format!("`{name}` is measured or has a request of its own; free are {free}"));

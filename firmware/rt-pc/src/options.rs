@@ -3,7 +3,10 @@
 use std::path::PathBuf;
 
 use lexopt::prelude::*;
-use specgen_rt::clock::SECOND;
+
+/// Units of times, ns.
+const MS: f64 = 1e6;
+const S: f64 = 1e9;
 
 pub const HELP: &str = "\
 Runs the controller in real time on this PC.
@@ -170,16 +173,9 @@ fn read(arguments: impl IntoIterator<Item = std::ffi::OsString>) -> Result<Invoc
             Long("comedi-out-range") => options.comedi_ranges[1] = range(&mut parser, "--comedi-out-range")?,
             Long("comedi-library") => options.comedi_library = Some(parser.value()?.into()),
             Long("assumed-ok") => options.assumed_ok = true,
-            Long("sim-timeout") => {
-                options.sim_timeout = (number(&mut parser, "--sim-timeout", 0.1, 10_000.0)? * 1e6) as u64
-            }
-            Long("sim-edge-every") => {
-                let every = number(&mut parser, "--sim-edge-every", 0.01, 1e4)?;
-                options.sim_edge_every = Some((every * SECOND as f64) as u64);
-            }
-            Long("seconds") => {
-                options.duration = Some((number(&mut parser, "--seconds", 0.01, 1e7)? * SECOND as f64) as u64);
-            }
+            Long("sim-timeout") => options.sim_timeout = ns(&mut parser, "--sim-timeout", 0.1, 10_000.0, MS)?,
+            Long("sim-edge-every") => options.sim_edge_every = Some(ns(&mut parser, "--sim-edge-every", 0.01, 1e4, S)?),
+            Long("seconds") => options.duration = Some(ns(&mut parser, "--seconds", 0.01, 1e7, S)?),
             Long("late-after") => options.late_after = number(&mut parser, "--late-after", 0.01, 1.0)?,
             Long("priority") => options.priority = number(&mut parser, "--priority", 1.0, 99.0)? as u8,
             Long("elastic") => options.elastic = true,
@@ -192,10 +188,8 @@ fn read(arguments: impl IntoIterator<Item = std::ffi::OsString>) -> Result<Invoc
             }
             Long("config") => options.config.push(parser.value()?.string()?),
             Long("link") => options.link = Some(parser.value()?.into()),
-            Long("link-idle") => options.link_idle = (number(&mut parser, "--link-idle", 0.1, 86_400.0)? * 1e9) as u64,
-            Long("link-silence") => {
-                options.link_silence = Some((number(&mut parser, "--link-silence", 1.0, 60_000.0)? * 1e6) as u64);
-            }
+            Long("link-idle") => options.link_idle = ns(&mut parser, "--link-idle", 0.1, 86_400.0, S)?,
+            Long("link-silence") => options.link_silence = Some(ns(&mut parser, "--link-silence", 1.0, 6e4, MS)?),
             Long("capture") => options.capture = Some(parser.value()?.into()),
             Long("record") => options.record = Some(parser.value()?.into()),
             Long("json") => options.json = true,
@@ -215,6 +209,11 @@ fn number(parser: &mut lexopt::Parser, name: &str, low: f64, high: f64) -> Resul
         .ok()
         .filter(fits)
         .ok_or_else(|| format!("{name}: expected a number from {low} to {high}, found `{text}`").into())
+}
+
+/// A time in `unit` (ns) from `low` to `high`; ns.
+fn ns(parser: &mut lexopt::Parser, name: &str, low: f64, high: f64, unit: f64) -> Result<u64, lexopt::Error> {
+    Ok((number(parser, name, low, high)? * unit) as u64)
 }
 
 /// Two voltages, the lower one first.

@@ -39,23 +39,12 @@ pub struct Service<'a> {
     pub until: Option<u64>,
 }
 
-/// A reaction of the supervisor, with its cause.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Incident {
-    pub tick: u64,
-    /// The resulting phase.
-    pub phase: Phase,
-    pub cause: Cause,
-    /// Finding of the wiring check, if that is the cause.
-    pub finding: Finding,
-}
-
 /// Results at the end.
 #[derive(Debug, Default)]
 pub struct Outcome {
     pub last: Option<SupervisorReport>,
-    /// Faults, holds with a cause, and fallbacks, in order.
-    pub incidents: Vec<Incident>,
+    /// Reports of faults, of holds with a cause, and of fallbacks, in order.
+    pub incidents: Vec<SupervisorReport>,
     /// The record's rows, or the reason why it is incomplete.
     pub record: Option<(PathBuf, io::Result<u64>)>,
     /// The last file of the recorder, and its ticks or the error.
@@ -148,12 +137,7 @@ impl Service<'_> {
             let faulted = said.phase == Phase::Faulted && before.0 != Phase::Faulted;
             let held = said.phase == Phase::Holding && said.cause != Cause::None && (said.phase, said.cause) != before;
             if faulted || held || fell_back {
-                outcome.incidents.push(Incident {
-                    tick: said.tick,
-                    phase: said.phase,
-                    cause: said.cause,
-                    finding: said.finding,
-                });
+                outcome.incidents.push(said);
             }
             self.console.update(&row, said, now);
             if let Some(link) = &mut self.link {

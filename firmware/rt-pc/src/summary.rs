@@ -7,8 +7,8 @@ use specgen_rt::account::{Account, Cause as Late};
 use specgen_rt::allocation;
 use specgen_rt::histogram::Histogram;
 
-use crate::operator::why;
-use crate::service::{Incident, Outcome, Traffic};
+use crate::operator::{SupervisorReport, why};
+use crate::service::{Outcome, Traffic};
 
 pub struct Summary<'a> {
     pub account: &'a Account,
@@ -108,14 +108,14 @@ impl Summary<'_> {
             silent("skipped", account.skipped().iter().sum::<u64>().into()),
             silent("balances", Json::Flag(account.balances())),
             silent("causes", Json::List(Late::ALL.into_iter().filter_map(|cause| self.cause(cause)).collect())),
-            silent("times", Json::object(account.histograms().map(|(name, times)| (name, quantiles(times))))),
+            silent("times", Json::Object(account.histograms().map(|(name, times)| (name, quantiles(times))).collect())),
             ("allocations", allocation::noticed().into(), of_loop),
             silent("waiting_ticks", account.blocked().into()),
             silent("lost_rows", self.lost_rows.into()),
             silent("device_faults", self.device_faults.into()),
             (
                 "incidents",
-                Json::list(&outcome.incidents, |Incident { tick, phase, cause, finding }| {
+                Json::list(&outcome.incidents, |SupervisorReport { tick, phase, cause, finding, .. }| {
                     let why = why(*cause, *finding);
                     let [phase, cause, why] = [format!("{phase:?}"), format!("{cause:?}"), why].map(Json::from);
                     Json::object([("tick", (*tick).into()), ("phase", phase), ("cause", cause), ("why", why)])
@@ -171,8 +171,8 @@ fn quantiles(times: &Histogram) -> Json {
     ])
 }
 
-fn words(incident: &Incident) -> String {
-    let Incident { tick, phase, cause, finding } = incident;
+fn words(incident: &SupervisorReport) -> String {
+    let SupervisorReport { tick, phase, cause, finding, .. } = incident;
     let did = if *phase == Phase::Faulted { "faulted" } else { "held" };
     format!("the machine {did} at tick {tick}: {}", why(*cause, *finding))
 }
@@ -266,8 +266,17 @@ mod tests {
     use std::io;
     use std::path::PathBuf;
 
-    const INCIDENT: Incident =
-        Incident { tick: 41, phase: Phase::Faulted, cause: Cause::EmergencyStop, finding: Finding::None };
+    const INCIDENT: SupervisorReport = SupervisorReport {
+        tick: 41,
+        phase: Phase::Faulted,
+        cause: Cause::EmergencyStop,
+        finding: Finding::None,
+        on: false,
+        status: 0,
+        orders: 0,
+        waving: false,
+        late: 0,
+    };
 
     /// A book of three ticks, of which one is late, behind two that were skipped.
     fn account() -> Account {
@@ -334,10 +343,10 @@ mod tests {
             (outcome.capture, outcome.incidents) = (Some((file(), full())), vec![INCIDENT]);
         });
         found("the machine faulted at tick 41: emergency stop", &|outcome, _| {
-            outcome.incidents = vec![INCIDENT, Incident { tick: 50, ..INCIDENT }];
+            outcome.incidents = vec![INCIDENT, SupervisorReport { tick: 50, ..INCIDENT }];
         });
         found("the machine held at tick 41", &|outcome, _| {
-            outcome.incidents = vec![Incident { phase: Phase::Holding, ..INCIDENT }];
+            outcome.incidents = vec![SupervisorReport { phase: Phase::Holding, ..INCIDENT }];
         });
     }
 

@@ -8,22 +8,15 @@ use specgen_runtime::PermittedRange;
 /// Words of a command: those that an operator may set. The others are measured or have their own source.
 pub type Command = [u64; COMMAND_WORDS];
 
-/// There is no word of this name.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct UnknownWord(pub String);
-
-impl std::fmt::Display for UnknownWord {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "the controller has no input word `{}`; it has {}", self.0, MACHINE_INPUT_NAMES.join(", "))
-    }
-}
-
 /// The index of a named input word.
 ///
 /// # Errors
-/// If there is none of this name.
-pub fn place(name: &str) -> Result<usize, UnknownWord> {
-    MACHINE_INPUT_NAMES.iter().position(|known| *known == name).ok_or_else(|| UnknownWord(name.to_owned()))
+/// As text, if there is none of this name.
+pub fn place(name: &str) -> Result<usize, String> {
+    MACHINE_INPUT_NAMES
+        .iter()
+        .position(|known| *known == name)
+        .ok_or_else(|| format!("the controller has no input word `{name}`; it has {}", MACHINE_INPUT_NAMES.join(", ")))
 }
 
 /// A number as a word of this controller's arithmetic, an f32 with zeros above.
@@ -102,7 +95,7 @@ mod tests {
         assert_eq!(word_of(request, 3.0), Some(3));
         assert_eq!([0.5, -1.0, 5e9, f64::NAN].map(|value| word_of(request, value)), [None; 4]);
         assert_eq!(word_of(place("setpoint[2]").unwrap(), 1e-6), Some(word(1e-6)));
-        assert!(place("setpoint[6]").unwrap_err().to_string().contains("no input word `setpoint[6]`"));
+        assert!(place("setpoint[6]").unwrap_err().contains("no input word `setpoint[6]`"));
     }
 
     #[test]

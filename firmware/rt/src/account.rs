@@ -122,12 +122,14 @@ pub struct Account {
     worst: [Option<(u64, Stamps)>; Cause::ALL.len()],
     /// End of the last tick, and the cause if it was late.
     previous: Option<(u64, Option<Cause>)>,
-    wake: Histogram,
-    input: Histogram,
-    computation: Histogram,
-    output: Histogram,
-    response: Histogram,
+    /// Times by [`TIMES`].
+    times: [Histogram; TIMES.len()],
 }
+
+/// Names of times, see [`Account::histograms`].
+const TIMES: [&str; 5] = ["wake", "gauges", "computation", "amplifiers", "response"];
+/// The last of them.
+const RESPONSE: usize = TIMES.len() - 1;
 
 impl Account {
     /// An empty book for ticks of `period` whose outputs are due `limit` after their time, ns.
@@ -143,11 +145,7 @@ impl Account {
             blocked: 0,
             worst: [None; Cause::ALL.len()],
             previous: None,
-            wake: Histogram::new(),
-            input: Histogram::new(),
-            computation: Histogram::new(),
-            output: Histogram::new(),
-            response: Histogram::new(),
+            times: [const { Histogram::new() }; TIMES.len()],
         }
     }
 
@@ -170,12 +168,7 @@ impl Account {
     pub fn tick(&mut self, stamps: &Stamps, usage: &Usage, suspended: bool) -> Verdict {
         let Stamps { planned, woken, read, computed, written, done } = *stamps;
         self.planned += 1;
-        self.wake.add(woken.saturating_sub(planned));
-        self.input.add(read.saturating_sub(woken));
-        self.computation.add(computed.saturating_sub(read));
-        self.output.add(written.saturating_sub(computed));
         let response = written.saturating_sub(planned);
-        self.response.add(response);
         if usage.voluntary_switches > 0 {
             self.blocked += 1;
         }
@@ -186,6 +179,10 @@ impl Account {
             (computed.saturating_sub(read), Cause::Computation),
             (written.saturating_sub(computed), Cause::Output),
         ];
+        let times = phases.iter().map(|(time, _)| *time).chain([response]);
+        for (histogram, time) in self.times.iter_mut().zip(times) {
+            histogram.add(time);
+        }
         let mut longest = phases[0];
         for phase in phases {
             if phase.0 > longest.0 {
@@ -262,17 +259,10 @@ impl Account {
         self.worst[cause as usize].map(|(delay, _)| delay)
     }
 
-    /// Phase histograms with their names: from the planned time to waking, gauges, computation, amplifiers, and from the
-    /// planned time to the outputs.
-    #[must_use]
-    pub fn histograms(&self) -> [(&'static str, &Histogram); 5] {
-        [
-            ("wake", &self.wake),
-            ("gauges", &self.input),
-            ("computation", &self.computation),
-            ("amplifiers", &self.output),
-            ("response", &self.response),
-        ]
+    /// Times with their names: from the planned time to waking, gauges, computation, amplifiers, and from the planned time
+    /// to the outputs.
+    pub fn histograms(&self) -> impl Iterator<Item = (&'static str, &Histogram)> {
+        TIMES.into_iter().zip(&self.times)
     }
 
     /// planned = on time + late + skipped, by independent counters, with a response time for every completed tick.
@@ -280,7 +270,7 @@ impl Account {
     pub fn balances(&self) -> bool {
         let late: u64 = self.late.iter().sum();
         let skipped: u64 = self.skipped.iter().sum();
-        self.planned == self.on_time + late + skipped && self.response.count() == self.on_time + late
+        self.planned == self.on_time + late + skipped && self.times[RESPONSE].count() == self.on_time + late
     }
 
     /// The book as tables.
@@ -316,7 +306,7 @@ impl Account {
             }
             let _ = writeln!(text, "{:>11}", known_text(histogram.largest()));
         }
-        let _ = write!(text, "outputs after the planned time:\n{}", self.response.to_text());
+        let _ = write!(text, "outputs after the planned time:\n{}", self.times[RESPONSE].to_text());
         text
     }
 }

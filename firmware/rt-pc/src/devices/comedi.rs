@@ -72,7 +72,12 @@ impl<'a> Comedi<'a> {
         let (line, lines) = input
             .subdevice(DIGITAL)
             .ok_or_else(|| format!("{path}: {name} has no digital line to enable amplifiers"))?;
-        input.make_output(line, 0).map_err(|error| format!("{path}: digital line 0 as an output: {error}"))?;
+        let configure = |number: u32, direction: u32| {
+            let what = if direction == library::OUTPUT { "output" } else { "input" };
+            let done = input.configure_line(line, number, direction);
+            done.map_err(|error| format!("{path}: digital line {number} as an {what}: {error}"))
+        };
+        configure(0, library::OUTPUT)?;
         // Before anything else.
         if !input.set_line(line, 0, false) {
             return Err(format!("{path}: digital line 0 cannot be set: amplifiers could not be switched off"));
@@ -86,14 +91,10 @@ impl<'a> Comedi<'a> {
             ));
         }
         for number in [STOP, FAULT].into_iter().chain(INPUT.then_some(INPUT_LINE)) {
-            input
-                .make_input(line, number)
-                .map_err(|error| format!("{path}: digital line {number} as an input: {error}"))?;
+            configure(number, library::INPUT)?;
         }
         for number in (1..=LINES as u32).chain([HEARTBEAT]) {
-            input
-                .make_output(line, number)
-                .map_err(|error| format!("{path}: digital line {number} as an output: {error}"))?;
+            configure(number, library::OUTPUT)?;
             if !input.set_line(line, number, false) {
                 return Err(format!("{path}: digital line {number} cannot be set"));
             }

@@ -20,8 +20,8 @@ pub const DIGITAL: c_int = 5;
 /// Volts, the unit of a range.
 const UNIT_VOLT: c_uint = 0;
 /// Direction of a digital line.
-const OUTPUT: c_uint = 1;
-const INPUT: c_uint = 0;
+pub const OUTPUT: c_uint = 1;
+pub const INPUT: c_uint = 0;
 const READ: c_uint = 0x0400_0000;
 const WRITE: c_uint = 0x0800_0001;
 
@@ -201,23 +201,11 @@ impl Card<'_> {
         u32::try_from(found).ok()
     }
 
-    /// Makes a digital line an output.
+    /// Makes a digital line an input or an output.
     ///
     /// # Errors
     /// What the library says.
-    pub fn make_output(&self, subdevice: u32, line: u32) -> Result<(), String> {
-        self.configure_line(subdevice, line, OUTPUT)
-    }
-
-    /// Makes a digital line an input.
-    ///
-    /// # Errors
-    /// What the library says.
-    pub fn make_input(&self, subdevice: u32, line: u32) -> Result<(), String> {
-        self.configure_line(subdevice, line, INPUT)
-    }
-
-    fn configure_line(&self, subdevice: u32, line: u32, direction: c_uint) -> Result<(), String> {
+    pub fn configure_line(&self, subdevice: u32, line: u32, direction: c_uint) -> Result<(), String> {
         // SAFETY: an open handle and numbers.
         let answer = unsafe { (self.library.functions.configure_line)(self.handle, subdevice, line, direction) };
         if answer < 0 { Err(self.library.last_error()) } else { Ok(()) }
@@ -252,22 +240,18 @@ impl Card<'_> {
     /// Reads channels one after the other in one call; false if not all were read.
     #[must_use]
     pub fn read<const N: usize>(&self, subdevice: u32, channels: &[u32; N], codes: &mut [u32; N]) -> bool {
-        self.perform(READ, subdevice, channels, codes)
+        self.perform(READ, subdevice, channels, N, codes)
     }
 
     /// Gives codes out one after the other in one call; false if not all were.
     #[must_use]
     pub fn write<const N: usize>(&self, subdevice: u32, channels: &[u32; N], count: usize, codes: &[u32; N]) -> bool {
         let mut codes = *codes;
-        self.perform_first(WRITE, subdevice, channels, count, &mut codes)
-    }
-
-    fn perform<const N: usize>(&self, kind: c_uint, subdevice: u32, channels: &[u32; N], codes: &mut [u32; N]) -> bool {
-        self.perform_first(kind, subdevice, channels, N, codes)
+        self.perform(WRITE, subdevice, channels, count, &mut codes)
     }
 
     /// The first `count` of the channels. No allocation: the list is on the stack.
-    fn perform_first<const N: usize>(
+    fn perform<const N: usize>(
         &self,
         kind: c_uint,
         subdevice: u32,
