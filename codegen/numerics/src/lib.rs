@@ -55,7 +55,7 @@ pub use jury::{ewma_limit, pcc_limit};
 pub use kernels::{
     Kernels, coriolis, displacements, expand_leg_forces, gravity, jacobian, leg_forces, mass_matrix, pivot_ratio,
 };
-pub use loci::{ComplexMatrix, Loci, product};
+pub use loci::{ComplexMatrix, Loci, complex_eigenvalues, product};
 pub use matrix::{Matrix, Matrix6, multiply6, transpose6};
 pub use resolvent::Resolvent;
 pub use search::{largest, simplex};

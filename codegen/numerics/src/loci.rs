@@ -20,7 +20,7 @@ pub struct Loci(Vec<(f64, Complex<f64>)>);
 impl Loci {
     /// Adds the eigenvalues of `plant`·`controller` at a frequency, times each of `ratios`.
     pub fn include(&mut self, frequency: f64, plant: &ComplexMatrix, controller: &ComplexMatrix, ratios: &[f64]) {
-        for value in eigenvalues(&(plant * controller)) {
+        for value in complex_eigenvalues(&(plant * controller)) {
             self.0.extend(ratios.iter().map(|ratio| (frequency, value * *ratio)));
         }
     }
@@ -61,7 +61,8 @@ impl Loci {
 }
 
 /// Eigenvalues of a matrix. Modes that are not coupled keep their own.
-fn eigenvalues(matrix: &ComplexMatrix) -> [Complex<f64>; 6] {
+#[must_use]
+pub fn complex_eigenvalues(matrix: &ComplexMatrix) -> [Complex<f64>; 6] {
     let mut found = [Complex::new(0.0, 0.0); 6];
     let mut done = [false; 6];
     for first in 0..6 {

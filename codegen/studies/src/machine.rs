@@ -280,7 +280,7 @@ impl StructureShares {
     #[must_use]
     pub fn worst(kind: usize, kinds: usize) -> Self {
         let mode = [(kind as f64 + 0.5) / kinds as f64, 0.0, 0.0];
-        Self { mode, joints: 0.0, mains: [0.0; 3], drift: [0.5; LEGS] }
+        Self { mode, joints: 0.0, mains: [0.0; 3], drift: [0.5; LEGS], cable: [0.0; 2], jitter: 0.0 }
     }
 
     /// Adds this structure to a machine.

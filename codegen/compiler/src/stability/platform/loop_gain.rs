@@ -14,7 +14,7 @@ use super::closed_loop::{ClosedLoop, Conditions};
 use super::law::Tuning;
 use super::notch::Biquad;
 use super::sampled::{PLACE, Plant, shown};
-use specgen_numerics::{ComplexMatrix, Matrix6, product};
+use specgen_numerics::{ComplexMatrix, Matrix6, complex_eigenvalues, product};
 use specgen_runtime::{ControlMode, Law};
 
 fn complex(matrix: &Matrix6, factor: Complex<f64>) -> ComplexMatrix {
@@ -115,9 +115,9 @@ impl ClosedLoop {
         conditions: &Conditions,
         angles: &[f64],
     ) -> Vec<[[f64; 2]; 6]> {
-        let modes = self.modal_responses(conditions, 1.0, angles);
+        let (modes, controller) = (self.modal_responses(conditions, 1.0, angles), self.controller(law, tuning));
         let at = |(modes, &angle): (&[Complex<f64>; 6], &f64)| {
-            loci(&(self.plant_at(modes, angle) * self.controller_at(law, tuning, angle))).map(|one| [one.re, one.im])
+            complex_eigenvalues(&product(&self.plant_at(modes, angle), &controller(angle))).map(|one| [one.re, one.im])
         };
         modes.iter().zip(angles).map(at).collect()
     }
