@@ -12,7 +12,7 @@ use specgen_numerics::nyquist::{Complex, Flexure, over, plus, square, times};
 use specgen_runtime::{ControlMode, Law};
 
 use super::matrix::{Matrix6c, inverse, larger, left, multiply, norm, spectral_radius};
-use super::response::{Bin, Response};
+use super::response::Response;
 use crate::factors::{Factor, Factors};
 
 /// Largest permitted spectral radius of Q (I − T L): the error of a pass relative to that of the pass before.
