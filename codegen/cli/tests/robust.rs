@@ -356,7 +356,7 @@ fn ctrl_c_keeps_what_was_run_and_says_so() {
 #[ignore = "long: learning on machines of a study"]
 fn learned_errors_have_a_row_a_gate_and_parts() {
     let folder = Folder::new();
-    let text = std::fs::read_to_string(folder.path("reference.toml")).unwrap();
+    let text = fs::read_to_string(folder.path("reference.toml")).unwrap();
     let text = text.replacen("[control]\n", "[control]\ncorrection = \"2 um\"\nactive_damping = true\n", 1);
     let text = text.replacen(
         "stream_speed = [\"5 mm/s\", \"5 mm/s\", \"5 mm/s\"",
@@ -365,7 +365,7 @@ fn learned_errors_have_a_row_a_gate_and_parts() {
     );
     let text = text.replacen("stale_ticks  = 10", "stale_ticks = 3", 1);
     let text = text + "\n[robust]\nmax_learned = \"1 nm\"\n";
-    std::fs::write(folder.path("learning.toml"), text).unwrap();
+    fs::write(folder.path("learning.toml"), text).unwrap();
     let fixed =
         ["mass", "stiffness", "damping", "hysteresis", "creep", "lag", "noise"].map(|name| format!("{name}=1:1"));
     let mut study = vec!["robust", "learning.toml", "--draws", "1", "--learn", "2", "--vary", "delay_ticks=0:0"];
@@ -387,7 +387,7 @@ fn learned_errors_have_a_row_a_gate_and_parts() {
         "{}",
         single.stdout
     );
-    let report: Value = serde_json::from_slice(&std::fs::read(folder.path("single/report.json")).unwrap()).unwrap();
+    let report: Value = serde_json::from_slice(&fs::read(folder.path("single/report.json")).unwrap()).unwrap();
     let table = folder.read("single/runs.csv");
     let (head, rows) = table.split_once('\n').unwrap();
     assert!(head.ends_with(",seconds,path_seconds,learned_seconds,learned_path_seconds"), "{head}");
