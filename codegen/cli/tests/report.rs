@@ -167,11 +167,11 @@ fn the_report_of_a_platform_judges_errors_by_their_limits() {
         declared[0] == declared[1] && declared[2] == 5000.0 && least == [1.0, 0.01, 0.01],
         "{declared:?} {least:?}"
     );
-    for kind in 0..3 {
+    for (kind, name) in names[..3].iter().enumerate() {
         let (x, y) = (numbers(kind, "x"), numbers(kind, "y"));
         let mut within = x.windows(2).zip(&y).filter(|(x, _)| x[0] >= declared[0] && x[1] > x[0]);
-        assert!(within.all(|(_, ratio)| *ratio <= 0.01), "{}", names[kind]);
-        assert!(y.iter().any(|ratio| *ratio > 0.01), "{}", names[kind]);
+        assert!(within.all(|(_, ratio)| *ratio <= 0.01), "{name}");
+        assert!(y.iter().any(|ratio| *ratio > 0.01), "{name}");
     }
     let table = page.split("<caption>Errors on trajectories, rms</caption>").nth(1).unwrap();
     for (name, word) in [

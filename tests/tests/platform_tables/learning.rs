@@ -57,9 +57,11 @@ fn widening() -> &'static Bench {
     })
 }
 
-/// Three classes of legs, each with a controller from its own records.
-pub const CLASSES: [(&str, fn() -> &'static Bench); 3] =
-    [("plays", plays), ("Bouc-Wen", other), ("rate-widening plays", widening)];
+/// A class of legs: its name, and a machine with a controller from its own records.
+pub type Class = (&'static str, fn() -> &'static Bench);
+
+/// Three classes of legs.
+pub const CLASSES: [Class; 3] = [("plays", plays), ("Bouc-Wen", other), ("rate-widening plays", widening)];
 
 /// What the compiler knows of its loop, and what learning may do on every machine within the intervals of [robust].
 fn design(bench: &Bench) -> (Learnable, Convergence) {
