@@ -6,7 +6,7 @@
 //! ```
 //! [`commands`] executes the commands of `specgen operate`, [`panel`] those of a page in the browser. [`pil`] runs the host library
 //! and a device in lock-step. [`gcs`] serves the General Command Set: `input` (bytes to commands), `commands`, `stage` (servo,
-//! target, limits), `server` (clients, one of which is in control). [`served`] is the simulated machine with converters, and
+//! target, limits), `server` (clients, one of which is in control). [`plant_server`] is the simulated machine with converters, and
 //! [`doctor`] checks a PC for real-time operation.
 
 mod command;

@@ -184,7 +184,7 @@ fn structural_modes_that_the_spec_lacks_end_quiet() {
         (MOUNT(300.0, 0.01), 3),
         (LEG(300.0, 0.05), 2),
         (LEG(700.0, 0.01), 1),
-        (LEG(300.0, 0.01), 3),
+        (LEG(300.0, 0.01), 2),
         (MOUNT(700.0, 0.01), 1),
         (MOUNT(300.0, 0.03), 1),
     ];
