@@ -10,6 +10,8 @@ const GAUGE: f64 = 0.5;
 const FRAME: f64 = -0.1;
 /// That of a frame in a spec.
 const FRAME_REACTION: &str = "-0.1";
+/// Modes at the same place count as one if their frequencies differ by at most this fraction.
+const SAME: f64 = 0.01;
 
 const FREQUENCY: Shape = one(Dimension::FREQUENCY, Range::closed(0.1, 1e7), "Hz");
 const KIND: Item = Item::Choice(StructuralKind::WORDS);
@@ -54,6 +56,19 @@ section! {
             StructuralKind::Gauge => fields.number(&join(table, "participation")).unwrap_or(GAUGE),
             StructuralKind::Frame => fields.number(&join(table, "participation")).unwrap_or(FRAME),
         };
+    }
+}
+
+impl StructuralMode {
+    /// Whether two modes, each with kind, number of leg or gauge, and frequency (Hz), count as one: of a kind at the same place with
+    /// frequencies that differ by at most 1 %.
+    #[must_use]
+    pub fn coincide(
+        (kind, at, frequency): (StructuralKind, Option<usize>, f64),
+        (other_kind, other_at, other): (StructuralKind, Option<usize>, f64),
+    ) -> bool {
+        let meet = at.is_none() || other_at.is_none() || at == other_at;
+        kind == other_kind && meet && (other - frequency).abs() <= SAME * frequency.max(other)
     }
 }
 

@@ -12,6 +12,7 @@ use crate::factors::Factors;
 use crate::learning::{Convergence, Excitation, ModeMeasurement, PASSES, Structure, takes_correction};
 use specgen_compiler::compile::Compilation;
 use specgen_language::interrupt;
+use specgen_language::model::StructuralMode;
 use specgen_language::outcome::{Failure, Outcome};
 use specgen_language::output::write_file;
 use specgen_language::table::{right, row};
@@ -57,6 +58,7 @@ pub(super) fn run(
                 band: excitation.band,
                 amplitude_nm: excitation.amplitude * 1e9,
                 modes,
+                shown: shown(structure.as_ref(), &compiled.model.structural_modes, excitation.band[1]),
                 structure,
                 convergence: learnable_of(compiled)?.with(response).convergence(&factors, options.bandwidth),
                 file: path.display().to_string(),
@@ -72,9 +74,9 @@ pub(super) fn run(
     }
 }
 
-/// What the response, measured up to `high` (Hz), shows of the structure, with lines for the spec.
-fn shown(structure: Option<&Structure>, high: f64) -> String {
-    let Some(Structure { modes, unresolved, band, .. }) = structure else {
+/// What the response, measured up to `high` (Hz), shows of the structure, with lines for the spec, which has the modes `listed`.
+fn shown(structure: Option<&Structure>, listed: &[StructuralMode], high: f64) -> String {
+    let Some(found @ Structure { modes, unresolved, band, .. }) = structure else {
         return "  structural modes: the sweep covers too little; choose a higher --bandwidth\n".to_owned();
     };
     let mut text = match (modes.len(), unresolved) {
@@ -102,11 +104,7 @@ fn shown(structure: Option<&Structure>, high: f64) -> String {
     if let Some(f0) = f0 {
         text.push_str(&format!("[robust.structure]\nf0 = \"{f0:.0} Hz\"\n\n"));
     }
-    for mode in modes {
-        text.push_str(&mode.lines());
-        text.push('\n');
-    }
-    text
+    text + &found.lines(listed)
 }
 
 /// Report of a measurement.
@@ -121,6 +119,9 @@ struct MeasuredResponse {
     modes: [ModeMeasurement; 6],
     /// Structural modes beyond those of the model, if the record suffices for a fit.
     structure: Option<Structure>,
+    /// The same as text.
+    #[serde(skip)]
+    shown: String,
     /// Convergence of learning with this response, if any.
     convergence: Option<Convergence>,
     file: String,
@@ -128,7 +129,7 @@ struct MeasuredResponse {
 
 impl Outcome for MeasuredResponse {
     fn text(&self) -> String {
-        let Self { name, machine, band: [low, high], amplitude_nm, modes, structure, convergence, file } = self;
+        let Self { name, machine, band: [low, high], amplitude_nm, modes, shown, convergence, file, .. } = self;
         let mut text = format!(
             "{name}: response of the running loop from {low:.1} to {high:.0} Hz, {PASSES} sweeps of\n  {amplitude_nm:.0} nm ({machine})\n"
         );
@@ -139,7 +140,7 @@ impl Outcome for MeasuredResponse {
             let cells = [format!("{frequency:.1}"), at(largest), at(modelled), format!("{:.1} %", 100.0 * error)];
             row(&mut text, &columns, &[&cells[0], &cells[1], &cells[2], &cells[3]]);
         }
-        text.push_str(&shown(structure.as_ref(), *high));
+        text.push_str(shown);
         // Writing to a String cannot fail.
         let _ = match convergence {
             Some(Convergence { band: [low, high], radius, at, .. }) => writeln!(

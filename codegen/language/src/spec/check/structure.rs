@@ -2,14 +2,11 @@
 
 use crate::diagnostic::codes;
 use crate::keys::fields::Fields;
-use crate::model::StructuralKind;
 use crate::model::structure::place;
+use crate::model::{StructuralKind, StructuralMode};
 use crate::spec::findings::Findings;
 use crate::spec::keys::{self, MAX_TABLES};
 use crate::spec::text::number;
-
-/// Two modes at the same place count as one if their frequencies differ by less than this fraction.
-const SAME: f64 = 0.01;
 
 /// A leg has no participation; that of a gauge is above 0, that of the frame below.
 pub(super) fn participations(f: &Fields, findings: &mut Findings) -> Option<()> {
@@ -44,16 +41,12 @@ pub(super) fn participations(f: &Fields, findings: &mut Findings) -> Option<()> 
 pub(super) fn differ(f: &Fields, findings: &mut Findings) -> Option<()> {
     let mode = |index: usize| {
         let table = format!("mode[{index}]");
-        Some((place(f, &table)?, f.number(&keys::join(&table, "frequency"))?))
+        let (kind, at) = place(f, &table)?;
+        Some((kind, at, f.number(&keys::join(&table, "frequency"))?))
     };
     for index in 0..f.count("mode").min(MAX_TABLES) {
-        let Some(((kind, at), frequency)) = mode(index) else { continue };
-        let same = |other: &usize| {
-            mode(*other).is_some_and(|((other_kind, other_at), other)| {
-                let meet = at.is_none() || other_at.is_none() || at == other_at;
-                other_kind == kind && meet && (other - frequency).abs() <= SAME * frequency.max(other)
-            })
-        };
+        let Some(own) = mode(index) else { continue };
+        let same = |other: &usize| mode(*other).is_some_and(|other| StructuralMode::coincide(own, other));
         let Some(first) = (0..index).find(same) else { continue };
         let path = format!("mode[{index}].frequency");
         findings.add(

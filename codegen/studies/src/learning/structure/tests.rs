@@ -3,17 +3,25 @@ use std::path::Path;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use specgen_compiler::compile::compile_source;
+use specgen_compiler::lower::{leg_jacobian, poses_per_reading};
 use specgen_compiler::stability::platform::Conditions;
-use specgen_language::spec::SpecSource;
+use specgen_language::spec::{SpecSource, load};
+use specgen_numerics::multiply6;
+use specgen_numerics::nyquist::{Complex, over, plus, square, times};
 
+use super::super::matrix::{Matrix6c, inverse, multiply};
+use super::fit::{real, sum};
 use super::*;
 
 /// Cases with a mode, and cases without.
 const CASES: [u64; 2] = [30, 20];
 
+fn reference_spec() -> SpecSource {
+    SpecSource::read(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../../specs/reference.toml")).unwrap()
+}
+
 fn reference() -> Compilation {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../specs/reference.toml");
-    let source = SpecSource::read(&path).unwrap();
+    let source = reference_spec();
     let damped = "notch_damping   = 1.0\nactive_damping  = true\ncorrection = \"2 um\"";
     let text = source.text.replace("notch_damping   = 1.0", damped);
     assert_ne!(text, source.text);
@@ -182,4 +190,58 @@ fn a_machine_without_such_a_mode_shows_none() {
 #[ignore = "long: 20 machines"]
 fn none_of_20_machines_without_such_a_mode_shows_one() {
     none_of(CASES[1]);
+}
+
+/// Modes of a place, a frequency (Hz) and a participation each.
+fn structure_of(modes: &[(Place, f64, f64)]) -> Structure {
+    let parameter = |value: f64| Parameter { value, error: 0.1 * value.abs() };
+    let mode = |(place, frequency, part): &(Place, f64, f64)| StructuralMode {
+        frequency: parameter(*frequency),
+        damping: parameter(RATIO[0]),
+        participation: parameter(*part),
+        place: *place,
+    };
+    Structure { modes: modes.iter().map(mode).collect(), unresolved: None, band: None, misfit: 1.0 }
+}
+
+/// The modes of the reference with lines appended: kind, number and participation.
+fn read(lines: &str) -> Vec<(StructuralKind, Option<usize>, f64)> {
+    let source = reference_spec();
+    let text = format!("{}\n{lines}", source.text);
+    let (model, findings) = load(&SpecSource { text, ..source });
+    let model = model.unwrap_or_else(|| panic!("{lines}\n{findings:?}"));
+    model.structural_modes.iter().map(|mode| (mode.kind, mode.place, mode.participation)).collect()
+}
+
+#[test]
+fn a_spec_takes_the_lines_of_a_mode_at_every_place() {
+    use StructuralKind::{Frame, Gauge, Leg};
+    let line = |place, part| read(&structure_of(&[(place, 812.34, part)]).lines(&[]));
+    for index in 0..6 {
+        assert_eq!(line(Place::Leg(index), 1.0), [(Leg, Some(index), 1.0)]);
+        for part in [LEAST_PART, 0.5, 1.0] {
+            assert_eq!(line(Place::Gauge(index), part), [(Gauge, Some(index), part)]);
+            assert_eq!(line(Place::Gauge(index), -part), [(Frame, None, -part)]);
+        }
+    }
+    assert_eq!(line(Place::Legs, 1.0), [(Leg, None, 1.0)]);
+    assert_eq!(line(Place::Gauges, 0.5), [(Gauge, None, 0.5)]);
+    assert_eq!(line(Place::Gauges, -0.1), [(Frame, None, -0.1)]);
+}
+
+#[test]
+fn of_modes_that_a_spec_counts_as_one_the_lines_hold_the_one_that_acts_most() {
+    use StructuralKind::{Frame, Gauge};
+    let frames = [(Place::Gauge(1), 800.0, -0.1), (Place::Gauge(4), 805.0, -0.3), (Place::Gauges, 790.0, -0.2)];
+    let lines = structure_of(&frames).lines(&[]);
+    assert_eq!(read(&lines), [(Frame, None, -0.2), (Frame, None, -0.3)]);
+    let gauges = [(Place::Gauge(1), 800.0, 0.3), (Place::Gauge(2), 800.0, 0.3), (Place::Gauges, 807.0, 0.2)];
+    assert_eq!(read(&structure_of(&gauges).lines(&[])), [(Gauge, Some(1), 0.3), (Gauge, Some(2), 0.3)]);
+    // The spec has it already.
+    let listed = structure_of(&[(Place::Gauge(1), 800.0, 0.3)]).lines(&[]);
+    let source = reference_spec();
+    let text = format!("{}\n{listed}", source.text);
+    let model = load(&SpecSource { text, ..source }).0.unwrap();
+    let again = structure_of(&[(Place::Gauge(1), 803.0, 0.4)]).lines(&model.structural_modes);
+    assert_eq!(read(&format!("{listed}{again}")), [(Gauge, Some(1), 0.3)]);
 }
