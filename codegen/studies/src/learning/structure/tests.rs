@@ -233,7 +233,7 @@ fn of_modes_that_a_spec_counts_as_one_the_lines_hold_the_one_that_acts_most() {
     use StructuralKind::{Frame, Gauge};
     let frames = [(Place::Gauge(1), 800.0, -0.1), (Place::Gauge(4), 805.0, -0.3), (Place::Gauges, 790.0, -0.2)];
     let lines = structure_of(&frames).lines(&[]);
-    assert_eq!(read(&lines), [(Frame, None, -0.2), (Frame, None, -0.3)]);
+    assert_eq!(read(&lines), [(Frame, None, -0.3), (Frame, None, -0.2)]);
     let gauges = [(Place::Gauge(1), 800.0, 0.3), (Place::Gauge(2), 800.0, 0.3), (Place::Gauges, 807.0, 0.2)];
     assert_eq!(read(&structure_of(&gauges).lines(&[])), [(Gauge, Some(1), 0.3), (Gauge, Some(2), 0.3)]);
     // The spec has it already.
