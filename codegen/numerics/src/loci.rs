@@ -7,7 +7,7 @@ use crate::nyquist::Flexure;
 /// A 6×6 matrix of complex numbers.
 pub type ComplexMatrix = Matrix6<Complex<f64>>;
 
-/// a b.
+/// a b. It is here, and not in the compiler, because this crate is optimised for speed.
 #[must_use]
 pub fn product(a: &ComplexMatrix, b: &ComplexMatrix) -> ComplexMatrix {
     a * b

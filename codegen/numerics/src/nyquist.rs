@@ -205,7 +205,7 @@ struct Depth {
     factors: [f64; 2],
 }
 
-/// What a loop bears.
+/// What a loop tolerates.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Tolerance {
     /// Whether it is stable.

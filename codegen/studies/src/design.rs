@@ -1,4 +1,4 @@
-//! Designs active damping with gains and bandwidths that bear every structural mode which the spec permits, and writes the result
+//! Designs active damping with gains and bandwidths that tolerate every structural mode that the spec permits, and writes the result
 //! into the spec with a digest of what it was made from.
 
 use std::fmt::Write as _;

@@ -3,10 +3,11 @@
 use std::path::PathBuf;
 
 use lexopt::prelude::*;
+use specgen_rt::clock::SECOND;
 
 /// Units of times, ns.
-const MS: f64 = 1e6;
-const S: f64 = 1e9;
+const S: f64 = SECOND as f64;
+const MS: f64 = S / 1e3;
 
 pub const HELP: &str = "\
 Runs the controller in real time on this PC.

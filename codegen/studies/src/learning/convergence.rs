@@ -24,13 +24,13 @@ const LEAST_LEFT: f64 = 0.004;
 /// Candidate shares of the inverse: a smaller share learns more slowly, but tolerates more uncertainty.
 const SHARES: [f64; 11] = [1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.2, 0.1, 0.0];
 /// Share of the inverse of a measured T: legs with hysteresis answer a sweep and a correction of another size differently.
-const MEASURED: f64 = 0.7;
+const MEASURED_SHARE: f64 = 0.7;
 /// Ratio of the natural frequencies of unknown structural modes that are tried one after the other, and up to which multiple of a frequency.
-const FINELY: f64 = 1.005;
-const ABOVE: f64 = 2.0;
+const FREQUENCY_STEP: f64 = 1.005;
+const HIGHEST_MODE: f64 = 2.0;
 /// Bandwidth to learn such modes with a measured T, relative to f0, and what it is a multiple of, Hz.
-const BEYOND: f64 = 1.5;
-const ROUNDED: f64 = 50.0;
+const REACH: f64 = 1.5;
+const REACH_STEP: f64 = 50.0;
 /// Knots per period of f_c.
 const KNOTS: f64 = 3.5;
 /// Factor on the highest frequency, beyond which nothing is learned.
@@ -100,7 +100,7 @@ impl Convergence {
     /// measurement, up to `wish` (Hz); `None` if there is none.
     fn measured(response: &Response, wish: f64) -> Option<Self> {
         let bins = &response.bins;
-        let radii: Vec<f64> = bins.iter().map(|bin| 1.0 - MEASURED + MEASURED * bin.doubt()).collect();
+        let radii: Vec<f64> = bins.iter().map(|bin| 1.0 - MEASURED_SHARE + MEASURED_SHARE * bin.doubt()).collect();
         let inside = |k: &usize| bins[*k].hertz <= wish;
         let best = (0..radii.len()).filter(inside).min_by(|a, b| radii[*a].total_cmp(&radii[*b]))?;
         // NaN counts as not converging.
@@ -122,7 +122,7 @@ impl Convergence {
             return None;
         }
         let mut shares: Vec<[f64; 2]> = vec![[0.0, 0.0]];
-        let share = |k: usize| if learned(k) { MEASURED } else { 0.0 };
+        let share = |k: usize| if learned(k) { MEASURED_SHARE } else { 0.0 };
         shares.extend(bins.iter().enumerate().map(|(k, bin)| [bin.hertz, share(k)]));
         shares.push([JUST_BEYOND * end[0], 0.0]);
         let mut found = Self {
@@ -162,7 +162,7 @@ impl Convergence {
     /// ring first.
     #[must_use]
     pub fn reach(&self) -> f64 {
-        let beyond = ROUNDED * libm::ceil(BEYOND * self.unknown_from / ROUNDED);
+        let beyond = REACH_STEP * libm::ceil(REACH * self.unknown_from / REACH_STEP);
         if beyond > self.wish { beyond } else { self.wish }
     }
 
@@ -252,12 +252,12 @@ impl Learnable {
 
     /// T by the compiler's model, with a delay in ticks.
     pub(super) fn expected(&self, frequencies: &[f64], delay: f64) -> Vec<Matrix6c> {
-        self.response(&self.closed_loop, &late(delay), frequencies)
+        self.response(&self.closed_loop, &delayed(delay), frequencies)
     }
 
     /// T by the compiler's model.
     pub(super) fn nominal(&self, frequencies: &[f64]) -> Vec<Matrix6c> {
-        self.response(&self.closed_loop, &Conditions::NOMINAL, frequencies)
+        self.expected(frequencies, 0.0)
     }
 
     /// The highest f_c up to `wish` (Hz) at which learning converges on every machine within `factors`, or for a measured T within its
@@ -285,7 +285,7 @@ impl Learnable {
             measured: false,
             wish,
             edge: f64::INFINITY,
-            delay: middle(factors),
+            delay: middle_delay(factors),
             unknown_from: self.unknown.from,
             bounds: Vec::new(),
             shares,
@@ -311,8 +311,15 @@ impl Learnable {
         let shares = slow.chain(fast).collect();
         let edge = found.edge;
         let bounds = std::mem::take(&mut found.bounds);
-        let mut whole =
-            Convergence { band, radius: 0.0, at: 0.0, bounds: Vec::new(), shares, delay: middle(factors), ..found };
+        let mut whole = Convergence {
+            band,
+            radius: 0.0,
+            at: 0.0,
+            bounds: Vec::new(),
+            shares,
+            delay: middle_delay(factors),
+            ..found
+        };
         for (hertz, radius) in frequencies.iter().zip(&radii) {
             whole.meet(*hertz, *radius);
         }
@@ -324,7 +331,7 @@ impl Learnable {
 
     /// By the model, at each frequency (Hz): T⁻¹, the share of it used, and the largest radius over the machines within `factors`.
     fn modelled(&self, frequencies: &[f64], factors: &Factors) -> (Vec<Matrix6c>, Vec<f64>, Vec<f64>) {
-        let delay = middle(factors);
+        let delay = middle_delay(factors);
         let inverses: Vec<Matrix6c> = self.expected(frequencies, delay).iter().map(inverse).collect();
         let mut radii = self.with_unknown_modes(frequencies, delay);
         for (closed_loop, conditions) in self.machines(factors) {
@@ -351,10 +358,10 @@ impl Learnable {
     fn with_unknown_modes(&self, frequencies: &[f64], delay: f64) -> Vec<[f64; SHARES.len()]> {
         let StructureDemand { from, damping_ratio, flexures, suspects } = &self.unknown;
         let angles: Vec<f64> = frequencies.iter().map(|hertz| TAU * hertz * self.closed_loop.period).collect();
-        let loops = self.closed_loop.loci(self.law, &self.tuning, &late(delay), &angles);
+        let loops = self.closed_loop.loci(self.law, &self.tuning, &delayed(delay), &angles);
         let at = |(hertz, loops): (&f64, [Complex; 6])| {
-            let natural = std::iter::successors(Some(*from), |last| Some(last * FINELY));
-            let natural = natural.take_while(|one| one <= from || *one <= ABOVE * hertz);
+            let natural = std::iter::successors(Some(*from), |last| Some(last * FREQUENCY_STEP));
+            let natural = natural.take_while(|one| one <= from || *one <= HIGHEST_MODE * hertz);
             let factor = |one: f64| flexures.iter().map(move |flexure| flexure.factor(hertz / one, *damping_ratio));
             let unknown = natural.flat_map(factor);
             let known = suspects.iter().map(|one| one.flexure.factor(TAU * hertz / one.frequency, one.damping_ratio));
@@ -379,7 +386,7 @@ impl Learnable {
             let (frequency, damping_ratio) = (TAU * from, *damping_ratio);
             let mut closed_loop = self.closed_loop.clone();
             closed_loop.structure.push(StructuralChannel { flexure: *flexure, frequency, damping_ratio, place: None });
-            (closed_loop, late(middle(factors)))
+            (closed_loop, delayed(middle_delay(factors)))
         };
         flexures.iter().map(machine).collect()
     }
@@ -425,13 +432,13 @@ impl Learnable {
 }
 
 /// The middle of the interval of the delay, ticks.
-fn middle(factors: &Factors) -> f64 {
+fn middle_delay(factors: &Factors) -> f64 {
     let [low, high] = factors.range(Factor::DelayTicks);
     0.5 * (low + high)
 }
 
 /// The nominal machine with a delay in ticks.
-fn late(delay: f64) -> Conditions {
+fn delayed(delay: f64) -> Conditions {
     Conditions { delay, ..Conditions::NOMINAL }
 }
 

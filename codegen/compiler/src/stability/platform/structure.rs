@@ -100,8 +100,8 @@ pub struct Border {
 }
 
 impl Border {
-    /// The frequency of the interval, from that about `from` (Hz) on, that demands the most damping, and that ζ; none if every damping
-    /// is enough. The lowest frequency of the declared range begins an interval.
+    /// Of the intervals from the one about `from` (Hz) on, the one that demands the most damping: its lowest frequency, Hz, and that ζ.
+    /// None if every damping is enough. The lowest frequency of the declared range begins an interval.
     #[must_use]
     pub fn worst(&self, from: f64) -> Option<[f64; 2]> {
         let both = self.frequencies.iter().zip(&self.damping_ratios).skip(self.interval(from).unwrap_or(0));
@@ -201,7 +201,7 @@ impl Corners {
         needs.fold(0.0, |most, one| if one > most { one } else { most })
     }
 
-    /// Whether a control mode is stable with every structural mode that it must bear, by the border of stability.
+    /// Whether a control mode is stable with every structural mode that it must tolerate, by the border of stability.
     #[must_use]
     pub fn tolerates(&self, law: ControlMode, tuning: &Tuning) -> bool {
         let loci = self.loci(law, tuning);

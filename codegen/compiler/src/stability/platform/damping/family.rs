@@ -36,6 +36,7 @@ const UNSTABLE: f64 = 1000.0;
 const DEPTH: f64 = 20.0;
 /// Share of the least ζ to which the sections alone are designed: with gains, the loop of one mode is not the whole.
 const SPARE: f64 = 0.7;
+
 /// Gains and weights in the loop of one mode.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Feedback {
