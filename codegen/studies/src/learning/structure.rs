@@ -165,11 +165,10 @@ impl Learnable {
     #[must_use]
     pub fn structure(&self, compiled: &Compilation, bins: &[Bin]) -> Option<Structure> {
         let problem = Problem::new(self, compiled, bins)?;
-        let mut open = problem.fitted(&problem.start, Vec::new(), STEPS, Domain::Open);
-        let mut fit = problem.fitted(&open.platform, Vec::new(), FIRST_STEPS, Domain::Closed);
+        let mut fit = problem.fitted(&problem.start, Vec::new(), STEPS, Domain::Closed);
         let (mut modes, mut unresolved) = (Vec::new(), None);
         while fit.modes.len() < MOST {
-            let Some([next, best]) = problem.with_next_mode(&open) else { break };
+            let Some(best) = problem.with_next_mode(&fit) else { break };
             if fit.cost - best.cost < SHOWN * problem.misfit(&best) {
                 break;
             }
@@ -181,7 +180,7 @@ impl Learnable {
                 unresolved = best.modes.last().map(|mode| libm::exp(mode.values[0]));
                 break;
             }
-            (open, fit, modes) = (next, best, estimates);
+            (fit, modes) = (best, estimates);
         }
         modes.sort_by(|a, b| a.frequency.value.total_cmp(&b.frequency.value));
         let band = problem.band(&fit, unresolved);
@@ -191,27 +190,27 @@ impl Learnable {
 }
 
 impl Problem {
-    /// The next mode that P shows: fits of P and of T with it and the modes of a fit of P. `None` if P shows none.
+    /// A fit of T with the modes of another and the next one that P shows. `None` if P shows none.
     ///
-    /// P depends on a mode more linearly, so modes are sought there. Where feedback hides the platform, noise biases P by more than near
-    /// places differ, so T decides between these.
-    fn with_next_mode(&self, fit: &Fit) -> Option<[Fit; 2]> {
+    /// P depends on a mode more linearly, so modes are sought there, from the platform that fits T: from that of the spec, a fit of P may
+    /// end in a worse minimum. T, whose noise is known, decides between near places.
+    fn with_next_mode(&self, fit: &Fit) -> Option<Fit> {
+        let fit = self.fitted(&fit.platform, fit.modes.clone(), STEPS, Domain::Open);
         let with = |mode| {
             let modes = fit.modes.iter().copied().chain([mode]).collect();
             self.fitted(&fit.platform, modes, FIRST_STEPS, Domain::Open)
         };
-        let sought: Vec<Fit> = self.candidates(fit).into_iter().map(with).collect();
+        let sought: Vec<Fit> = self.candidates(&fit).into_iter().map(with).collect();
         let fall = |next: &Fit| fit.cost - next.cost;
         let most = sought.iter().map(fall).max_by(f64::total_cmp)?;
         let shown = |next: &Fit| fall(next) >= NEAR * most && fall(next) >= SHOWN * self.misfit(next);
-        let both = sought.into_iter().filter(shown).map(|next| {
+        let closed = sought.into_iter().filter(shown).map(|next| {
             let open = self.fitted(&next.platform, next.modes, STEPS, Domain::Open);
-            let closed = self.fitted(&open.platform, open.modes.clone(), STEPS, Domain::Closed);
-            [open, closed]
+            self.fitted(&open.platform, open.modes, STEPS, Domain::Closed)
         });
         // In series with all legs and on all gauges with a = 1 are nearly the same: the one with fewer parameters counts.
-        let bound = |[_, fit]: &[Fit; 2]| fit.cost + PER_PARAMETER * self.parameters(fit) as f64 * self.misfit(fit);
-        both.min_by(|a, b| bound(a).total_cmp(&bound(b)))
+        let bound = |fit: &Fit| fit.cost + PER_PARAMETER * self.parameters(fit) as f64 * self.misfit(fit);
+        closed.min_by(|a, b| bound(a).total_cmp(&bound(b)))
     }
 
     /// For each direction (legs, gauges, all), what the fit leaves there at each frequency, relative, with its weight.
@@ -229,7 +228,7 @@ impl Problem {
                     Place::Legs | Place::Gauges => at.factors.plant,
                 };
                 let (mut product, mut weight) = ([0.0; 2], 0.0);
-                for (i, j) in entries() {
+                for (i, j) in (0..36).map(|k| (k / 6, k % 6)) {
                     let w = point.plant_weights[i][j] * point.plant_weights[i][j];
                     let [re, im] = effect[i][j];
                     product = plus(product, times([w * re, -w * im], missing[i][j]));
@@ -328,10 +327,6 @@ fn shaped(list: &[(f64, Complex, f64)], hertz: f64, ratio: f64) -> Option<(Compl
         .zip(&shape)
         .fold([0.0; 2], |sum, ((_, left, w), [re, im])| plus(sum, times([w * re, -w * im], *left)));
     Some((product, norm))
-}
-
-fn entries() -> impl Iterator<Item = (usize, usize)> {
-    (0..36).map(|k| (k / 6, k % 6))
 }
 
 #[cfg(test)]
