@@ -309,17 +309,9 @@ impl Learnable {
         let fast = found.shares.iter().copied().filter(|[hertz, _]| *hertz >= found.edge);
         let band = [if first == 0 { 0.0 } else { frequencies[first] }, found.band[1]];
         let shares = slow.chain(fast).collect();
-        let edge = found.edge;
+        let (edge, delay) = (found.edge, middle_delay(factors));
         let bounds = std::mem::take(&mut found.bounds);
-        let mut whole = Convergence {
-            band,
-            radius: 0.0,
-            at: 0.0,
-            bounds: Vec::new(),
-            shares,
-            delay: middle_delay(factors),
-            ..found
-        };
+        let mut whole = Convergence { band, radius: 0.0, at: 0.0, bounds: Vec::new(), shares, delay, ..found };
         for (hertz, radius) in frequencies.iter().zip(&radii) {
             whole.meet(*hertz, *radius);
         }
