@@ -265,6 +265,7 @@ fn a_refused_configuration_leaves_the_old_one_in_force() {
 
 /// Settings to words and back, of the emitted crate itself, for the defaults and a thousand others.
 #[test]
+#[ignore = "long: a test of the emitted crate is built"]
 fn settings_come_back_from_their_words() {
     let each = [("platform-words-f64", &[][..]), ("platform-words-f32", &[F32][..])];
     for (folder, edits) in each.into_iter().take(specgen_tests::length(1, 2)) {

@@ -162,7 +162,7 @@ fn deviation(targets: &[Target<f64>], host: &dyn PoseTrajectory, period: f64) ->
 
 #[test]
 fn paths_on_board_are_the_hosts_to_a_picometre_in_f64_and_a_tenth_of_a_nanometre_in_f32() {
-    for frequency in [0.1, 1.0, 10.0] {
+    for frequency in [10.0, 1.0, 0.1].into_iter().take(specgen_tests::length(1, 3)) {
         let model = with_trajectories(PATHS.map(|(path, _)| paper(path, false, frequency)).to_vec());
         let double = plan::<f64>(&model, &lowered(&model, &[], Scalar::F64).unwrap());
         let single = plan::<f32>(&model, &lowered(&model, &[], Scalar::F32).unwrap());

@@ -11,7 +11,6 @@ mod release;
 mod results;
 mod skips;
 mod steps;
-mod suite;
 mod wheel;
 
 use std::process::ExitCode;

@@ -8,7 +8,6 @@ use crate::binaries::{self, Binary, Mode, TestResults};
 use crate::mutants::Sample;
 use crate::run::{Outcome, Report, SKIPPED, cargo, expect_success};
 use crate::setup::{self, TRIPLE};
-use crate::suite::Suite;
 use crate::{fuzz, mutants, packages, results, wheel};
 
 /// A workspace for another machine.
@@ -32,15 +31,10 @@ const LOCKED: [&str; 10] =
 const OWN_BOARD: &str = "target/tests/boards/own-board/own-board/Cargo.toml";
 /// A separate workspace, built by a test.
 const LINK_PROOF: &str = "firmware/link/tests/proof/Cargo.toml";
-/// A separate workspace because of its dependencies.
+/// Tests the published schema with a third-party validator. A separate workspace because of its dependencies.
 const SCHEMA: &str = "tests/schema/Cargo.toml";
-/// Tests the published schema with a third-party validator.
-const PUBLISHED_SCHEMA: Suite =
-    Suite { manifest: SCHEMA, inputs: &[("specs", "schema.json"), ("specs", ".toml"), ("specs/features", ".toml")] };
-/// A separate workspace because of its dependencies.
+/// Tests the memory ordering between two processes with a model checker. A separate workspace because of its dependencies.
 const LOOM: &str = "firmware/rt/tests/loom/Cargo.toml";
-/// Tests the memory ordering between two processes with a model checker.
-const SHARED_MEMORY: Suite = Suite { manifest: LOOM, inputs: &[("firmware/rt/src/exchange", ".rs")] };
 /// Packages outside of the workspace, except boards, which are formatted one by one.
 const FORMATTED_ALONE: [&str; 10] =
     [FIRMWARE, TICK, HOST_LIBRARY, REAL_TIME, wheel::MANIFEST, BOARDS_COMMON, SCHEMA, fuzz::MANIFEST, EMULATED, LOOM];
@@ -122,7 +116,7 @@ pub fn test(root: &Path) -> ExitCode {
     // Lints need a second pass of the compiler, so they run only under CI and in the full run.
     let lints_too = std::env::var_os("CI").is_some();
     let locked = with_boards(root, &LOCKED);
-    let mut report = Report::new(9 + usize::from(lints_too) + locked.len());
+    let mut report = Report::new(7 + usize::from(lints_too) + locked.len());
     report.step("the last full run", || results::judge(root));
     report.step("formatting", || formatting(root));
     let binaries = compiled(root, false, &mut report);
@@ -131,8 +125,6 @@ pub fn test(root: &Path) -> ExitCode {
     if lints_too {
         report.step("lints", || lints(root, false));
     }
-    report.step("published schema", || PUBLISHED_SCHEMA.unless_unchanged(root));
-    report.step("shared-memory ordering", || SHARED_MEMORY.unless_unchanged(root));
     report.step("generated files are fresh", || maintained(root, &["check"]));
     for manifest in &locked {
         report.step(&format!("lock file and licences of {manifest}"), || packages::check(root, manifest));
@@ -166,8 +158,8 @@ pub fn full(root: &Path) -> ExitCode {
         doc.env("RUSTDOCFLAGS", "-D warnings");
         expect_success(doc, "see the warnings above")
     });
-    report.step("published schema", || PUBLISHED_SCHEMA.run_and_keep(root));
-    report.step("shared-memory ordering", || SHARED_MEMORY.run_and_keep(root));
+    report.step("published schema", || separate(root, SCHEMA));
+    report.step("shared-memory ordering", || separate(root, LOOM));
     let (good, tests) = (!report.has_failed(), results::of_tests(&ran, start.elapsed()));
     report.step("result of the full run", || results::write(root, results::FULL, good, &tests));
     report.finish()
@@ -198,6 +190,14 @@ fn checked(root: &Path) -> Outcome {
         }
     }
     Outcome::Passed
+}
+
+/// Tests of a separate workspace.
+fn separate(root: &Path, manifest: &str) -> Outcome {
+    expect_success(
+        cargo(root, &["test", "--quiet", "--locked", "--all-targets", "--manifest-path", manifest]),
+        "see above",
+    )
 }
 
 /// Installs the cross compiler and QEMU if they are missing. Returns whether they are available.

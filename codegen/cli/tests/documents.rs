@@ -145,6 +145,7 @@ fn commands_and_options_of_the_documents_are_those_of_the_program() {
 
 /// The program of the page is compiled against the library of the reference spec, and moves the legs.
 #[test]
+#[ignore = "long: a library for C is built"]
 #[cfg(target_os = "linux")]
 fn the_example_in_c_runs() {
     let folder = Folder::new();

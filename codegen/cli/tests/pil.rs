@@ -143,6 +143,7 @@ fn six_legs_and_a_platform_are_bit_equal_in_closed_loop_and_legs_outrun_real_tim
 }
 
 #[test]
+#[ignore = "long: an image on the emulated board; the short run flips a bit of a constant on the host"]
 fn a_flipped_bit_in_a_table_of_the_image_is_found_with_its_tick_and_signal() {
     if support::tools().is_none() {
         return;
@@ -177,6 +178,7 @@ fn a_flipped_bit_in_a_table_of_the_image_is_found_with_its_tick_and_signal() {
 static NEVER: AtomicBool = AtomicBool::new(false);
 
 #[test]
+#[ignore = "long: three images on the emulated board, and waiting times"]
 fn an_emulator_that_ends_or_hangs_is_an_error_in_words() {
     if support::tools().is_none() {
         return;

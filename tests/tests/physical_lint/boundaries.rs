@@ -75,7 +75,7 @@ fn raised(rule: &Case, dir: &Path, bases: &mut Expectations) -> Result<String, S
 fn every_rule_has_its_boundary() {
     let dir = specgen_tests::repository().join("specs");
     let mut bases = Expectations::new();
-    cases::hold(&file(), specgen_tests::length(8, 1), |rule| {
+    cases::hold(&file(), specgen_tests::length(16, 1), |rule| {
         raised(rule, &dir, &mut bases).unwrap_or_else(|wrong| panic!("{wrong}"))
     });
     // No rule is left out; that of steps in a table of poses has a test of its own.
