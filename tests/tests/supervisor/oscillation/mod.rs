@@ -203,8 +203,8 @@ fn structural_modes_that_the_spec_lacks_end_quiet() {
         assert_eq!(times.iter().filter(|time| time.is_some()).count(), last, "{structure:?}: {times:?}");
         within_the_bar(&times, &format!("{structure:?}"));
         assert!(left < 25e-9, "{structure:?}: {left} m");
-        // Half of the range for a tenth of a second is an error of tracking, too, which holds.
-        let held = largest > 50e-6 && (machine.word.phase, machine.word.cause) == (HOLDING, TRACKING);
+        // Half of a gauge's range for a tenth of a second is an error of tracking, too, which holds. A pose error of 40 µm can reach it.
+        let held = largest > 40e-6 && (machine.word.phase, machine.word.cause) == (HOLDING, TRACKING);
         let phase = if last == 3 { FAULTED } else { RUNNING };
         assert!(held || (machine.word.phase, machine.word.cause) == (phase, OSCILLATION), "{structure:?}");
     }
