@@ -1,4 +1,4 @@
-//! The platform as a plant: six hysteretic legs under a rigid body, measured by six gauges, pressing on a work part.
+//! The platform as a plant: six hysteretic legs under a rigid body, measured by six gauges, pressing on a work piece.
 //!
 //! ```text
 //! voltages ─► amplifier (lag, current) ─► stack (plays, creep, asymmetry) ─► d_i ┐ ×6
@@ -6,7 +6,8 @@
 //!                                                       gauges ◄─ pose ─────────────────┘      └─► force sensor
 //! ```
 //! It is independent of the controller: dynamics from the motion of the bodies, leg lengths and gauge readings by plain
-//! geometry, hysteresis that no Everett table represents. SI units; angles are those of R = Rz Ry Rx.
+//! geometry; play operators (Prandtl-Ishlinskii) with a quadratic asymmetry, which breaks congruency, and creep: no
+//! Everett table represents them. SI units; angles are those of R = Rz Ry Rx.
 
 #![allow(clippy::needless_range_loop, reason = "matrices are indexed as in their formulae")]
 

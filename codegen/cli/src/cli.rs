@@ -112,7 +112,7 @@ enum Command {
     Sim(sim::Arguments),
     /// Tune gains and weights on the simulated loop.
     Tune(tune::Arguments),
-    /// Design active damping for every structural mode that the spec permits, and write it into the spec.
+    /// Design active damping that is stable with every structural mode in [robust.structure], and write it into the spec.
     Design(design::Arguments),
     /// Learn a repeated motion, simulated or on a machine: measure passes and compute the correction that cancels their error.
     Learn(learn::Arguments),

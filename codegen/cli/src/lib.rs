@@ -3,7 +3,7 @@
 //! ```text
 //! spec (TOML) → model (SI, checked) → tables (identified) → ir (every constant) → emitted crate (text) → built image
 //! ```
-//! Data flows one way, and a crate depends only on crates of lower layers: see ARCHITECTURE.md.
+//! Data flows one way, and a crate depends only on crates listed before it in ARCHITECTURE.md.
 
 pub mod cli;
 

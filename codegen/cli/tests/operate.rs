@@ -127,7 +127,7 @@ fn a_script_runs_a_wave_and_fetches_its_record() {
     // As JSON; and a refusal of the device is shown with its reason.
     let run = Run::of(&mut board.operate(&folder, &["reference.toml", "--json", "status", "config"]));
     let document: serde_json::Value = serde_json::from_str(&run.stdout).unwrap();
-    assert_eq!(document["result"]["status"]["stands"], "disarmed", "{document:#}");
+    assert_eq!(document["result"]["status"]["state"], "disarmed", "{document:#}");
     assert_eq!(document["result"]["answers"][1]["answer"]["mode"], 6, "{document:#}");
     let run = Run::of(&mut board.operate(&folder, &["wave fast.toml"]));
     run.says(1, &["not checked against a spec", "fast.toml: axis z (leg 2) would exceed the speed"]);
@@ -163,6 +163,36 @@ fn a_script_runs_a_wave_and_fetches_its_record() {
     // Another controller is refused.
     let run = Run::of(&mut board.operate(&folder, &["legs.toml", "arm"]));
     run.says(1, &["the device runs the controller `reference` of spec digest"]);
+    assert!(board.is(Phase::Disarmed));
+}
+
+#[test]
+fn narrow_code_limits_keep_the_voltage_while_arming_and_running() {
+    let folder = Folder::new();
+    let board = SocketBoard::new(&folder);
+    // Without the spec, so that the machine is not without a host while it is compiled.
+    let operate = |commands: &[&str]| Run::of(&mut board.operate(&folder, commands));
+    let volts = || {
+        let document: serde_json::Value = serde_json::from_str(&operate(&["--json", "where"]).stdout).unwrap();
+        let volts = document["result"]["answers"][0]["answer"]["voltage"].clone();
+        serde_json::from_value::<Vec<f64>>(volts).unwrap()
+    };
+    operate(&["config code_max=4369 code_min=4370"]).says(1, &["expected code_min ≤ code_max"]);
+    operate(&["config code_max=43691"]).says(1, &["`code_max`: expected code_min ≤ code_max, within the spec's"]);
+    // One code for all legs, as in the loop-back of the bring-up; this image has the wiring check, which needs the codes below.
+    let one = "config code_min=4000 code_max=4000";
+    operate(&["arm", "wait holding 20", one, "run", "wait running 20", "wait 9"])
+        .says(1, &["holding: voltage saturation"]);
+    assert!(volts().iter().all(|volts| (volts - 4000.0 * 150.0 / 65_535.0).abs() < 1e-9), "{:?}", volts());
+    operate(&["ramp-down", "wait disarmed 60"]).says(1, &["faulted: link lost"]);
+    wait(&board, Phase::Faulted);
+    operate(&["acknowledge", "wait disarmed 20"]).says(0, &[]);
+    // A tenth of 100 V: the wiring check has room, the bias of 10 µm is out of reach.
+    let tenth = ["config code_min=0 code_max=4369", "arm", "wait holding 20", "run", "wait running 20"];
+    operate(&[&tenth[..], &["wait arrived 20"]].concat()).says(1, &["holding: voltage saturation"]);
+    assert!((9.0..=10.0).contains(&volts().into_iter().fold(0.0, f64::max)));
+    let tenths = ["config code_max=13107", "none", "run", "wait running 20", "wait arrived 20", "move z=1um"];
+    operate(&[&tenths[..], &["wait arrived 20", "ramp-down", "wait disarmed 60"]].concat()).says(0, &[]);
     assert!(board.is(Phase::Disarmed));
 }
 

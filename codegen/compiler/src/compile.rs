@@ -41,9 +41,9 @@ pub struct Compilation {
     pub demands: Vec<PathDemand>,
     /// Stopping distances from every declared speed.
     pub stops: Vec<Stopping>,
-    /// Noise of the measured pose, if the gauges measure the platform.
+    /// Sensor noise of the pose, rms, m and rad, if the gauges measure the platform.
     pub pose_noise: Option<PoseNoise>,
-    /// Noise of the pose at rest, as the gauges measure it.
+    /// Closed-loop noise at rest as measured, rms, m and rad.
     pub rest_noise: RestNoise,
     /// Values that were not measured.
     pub assumptions: Assumptions,

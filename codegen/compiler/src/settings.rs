@@ -9,7 +9,7 @@ use crate::ir::{Ir, Range, Setting};
 pub fn markdown(platform: &Ir, legs: &Ir) -> String {
     let mut text = String::from(
         "# Settings\n\n\
-         The `Config` of a controller is what may change while it runs: in code (`with_…` of the emitted `config.rs`), as words \
+         The `Config` of a controller is what may change while it runs: in code (`Config::with`), as words \
          (records, `--config` of a real-time PC, `specgen tune`) or over the link (`config write SPEC` of `specgen operate`). Each \
          word has a range that includes both ends. The ranges come from the spec and are in the emitted `permitted.rs`. A `Config` \
          with a word out of range is refused with the name of the word: no setting makes a machine leave the limits of its spec. \

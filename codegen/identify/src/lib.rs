@@ -3,8 +3,9 @@
 //! ```text
 //! CSV → record (checked samples) → usable part, branches → dead time → normal equations → non-negative weights → table
 //! ```
-//! Model: displacement(t + dead time) = offset of the branch + Σ w_c φ_c(drive), w_c ≥ 0, with one weight per cell of
-//! the plane, including the (reversible) triangles on the diagonal. Each branch between two reversals has a free
+//! Model: displacement(t + dead time) = offset of the branch + Σ w_c φ_c(drive), w_c ≥ 0, with one weight per cell c of
+//! the plane, including the (reversible) triangles on the diagonal; φ_c is the displacement of a unit weight in cell c.
+//! `prior` prefers similar weights of neighbouring cells that the record does not determine. Each branch between two reversals has a free
 //! offset, so that drift and creep between the curves do not distort the table. For a first-order reversal record only
 //! the falls are fitted, with most weight on samples near the thresholds of the grid. The result is the classical
 //! E(u_i, u_j) = f(u_i) − f_{u_i}(u_j), with less noise, for any spacing of the curves, and without negative weights.
@@ -125,7 +126,7 @@ pub struct Identification {
     pub warnings: Vec<Diagnostic>,
 }
 
-/// A residual above this share of the range shows that the model does not apply.
+/// A residual above this share of the range, %, shows that the model does not apply.
 const POOR_FIT_PERCENT: f64 = 3.0;
 
 /// Identifies the Everett table of one record.

@@ -7,7 +7,7 @@
 //! [`model`] declares each section of a spec once, keys and fields together. Parsing, checks, JSON Schema and the reference of keys in
 //! [`spec`] follow from these declarations; `keys/declare.rs` has their form. The pages of the findings are in `findings/`.
 //!
-//! The one crate that reads TOML. What every crate above needs is here, too: [`files`], [`output`], [`interrupt`] and [`lock`] to read
+//! The one crate that reads TOML. What every later crate needs is here, too: [`files`], [`output`], [`interrupt`] and [`lock`] to read
 //! and write files, [`outcome`], [`ui`] and [`table`] for the results of commands, [`editor`] for what editors ask, [`shell`] for lines of a shell in messages.
 
 pub mod diagnostic;

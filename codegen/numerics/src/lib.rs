@@ -1,5 +1,5 @@
-//! Numerics of the host with an effect on emitted bytes: plain loops in a written order, only IEEE basic operations and
-//! `libm`, so that every machine computes the same.
+//! Numerics of the host that determine emitted bytes: plain loops in a written order, only IEEE basic operations and
+//! `libm`, so that every computer gives the same bits.
 //!
 //! | part | what |
 //! |---|---|
@@ -8,15 +8,15 @@
 //! | [`diagonalize`] | eigenvalues of a symmetric matrix of any size, by Jacobi rotations |
 //! | [`Double`] | numbers of 106 bits: the reference for rounding errors |
 //! | [`TracedNumber`] | numbers that record every operation: bounds of rounding errors over a box of poses |
-//! | [`Taylor`] | numbers that are polynomials of a motion: expansion at rest, and a bound of what it leaves out |
+//! | [`Taylor`] | Taylor models: polynomials of a motion about rest, with a bound of the remainder |
 //! | [`ewma_limit`], [`pcc_limit`] | Jury limits of the run-to-run laws |
 //! | [`Factor`] | Cholesky factors of large matrices, by blocks |
 //! | [`nnls`] | non-negative least squares: the weights of a hysteresis table |
-//! | [`largest`], [`simplex`] | where a condition ceases to hold, by bisection; where a cost is least |
+//! | [`largest`], [`simplex`] | bisection for the limit of a condition; Nelder-Mead for the least cost |
 //! | [`Cma`] | global search for the least cost |
-//! | [`Resolvent`] | what a sampled system answers at each frequency |
-//! | [`Loci`] | structural modes with which a loop of six modes is on the border of stability |
-//! | [`steady_covariances`] | what white noise makes of the states of a sampled system |
+//! | [`Resolvent`] | frequency response of a sampled system |
+//! | [`Loci`] | stability boundary of a loop of six modes over structural modes |
+//! | [`steady_covariances`] | steady-state covariance of a sampled system under white noise |
 //! | [`fft`] | Fourier transforms |
 //! | [`nyquist`] | sensitivity and stability of a loop of one signal |
 //! | [`Kernels`], [`displacements`], [`leg_forces`], [`mass_matrix`] and others | the controller's kernels on these numbers, compiled here |

@@ -24,7 +24,7 @@ const EDGE_STARTS: &str = "move, jog, goto, play without a correction, or wave F
 const COMMANDS: &str = "status, arm, run, hold, ramp-down, acknowledge, none, set NAME=VALUE…, \
                         move|jog AXIS=QUANTITY…, where, limits, can-i-go AXIS=QUANTITY… [speed=QUANTITY], frame [none | work|tool AXIS=QUANTITY…], mark NAME, goto NAME, \
                         play TRAJECTORY [correction=FILE machine=NAME], mode p|f|pf, gains [NAME=VALUE…], trigger LINE NAME=VALUE…, \
-                        wait PHASE|arrived|SECONDS [TIMEOUT], config, config write SPEC, \
+                        wait PHASE|arrived|SECONDS [TIMEOUT], config [code_min=CODE] [code_max=CODE], config write SPEC, \
                         record arm [AFTER] | trigger | stop | look | download FILE, wave FILE | stop, on-edge [drop | move … | jog … | goto … | play … | wave FILE], watch [EVERY [SECONDS [FILE]]], stop";
 
 /// One command.
@@ -87,6 +87,8 @@ pub enum Command {
     },
     /// Show the settings in force.
     Config,
+    /// Set the lowest or highest code of all legs, `code_min` or `code_max`.
+    CodeLimits(Vec<(String, u64)>),
     /// Write the settings of a spec to the device.
     WriteConfig(PathBuf),
     /// A recorder action.
@@ -252,10 +254,12 @@ impl Command {
                 let settings = std::iter::once(&first).chain(rest).map(|text| of_trigger(text));
                 Self::Trigger { line, settings: settings.collect::<Result<_, _>>()? }
             }
-            ["wait", until] => Self::wait(until, None)?,
-            ["wait", until, limit] => Self::wait(until, Some(limit))?,
+            ["wait", until, ref limit @ ..] if limit.len() < 2 => Self::wait(until, limit.first().copied())?,
             ["config"] => Self::Config,
             ["config", "write", spec] => Self::WriteConfig(spec.into()),
+            ["config", ref rest @ ..] => {
+                Self::CodeLimits(rest.iter().map(|text| code_limit(text)).collect::<Result<_, _>>()?)
+            }
             ["record", "arm"] => Self::Record(RecorderAction::Arm { after: AFTER }),
             ["record", "arm", after] => {
                 let after = after.parse().ok().filter(|after| *after > 0);
@@ -330,6 +334,12 @@ fn gain(text: &str) -> Result<(String, f64), String> {
     Ok((name, value))
 }
 
+fn code_limit(text: &str) -> Result<(String, u64), String> {
+    let limit = assignment(text).ok().filter(|(name, _)| ["code_min", "code_max"].contains(&name.as_str()));
+    let limit = limit.and_then(|(name, code)| Some((name, code.parse::<u32>().ok()?.into())));
+    limit.ok_or_else(|| format!("expected write SPEC, code_min=CODE or code_max=CODE, found `{text}`"))
+}
+
 /// Settings that are choices, with the words of their values.
 const CHOICES: [(&str, &[&str]); 3] = [
     ("kind", &["off", "position", "level", "motion", "points", "ticks"]),
@@ -398,6 +408,7 @@ mod tests {
             ("watch 20 0.5 w.csv", Some(Command::Watch { every: Some(20), seconds: 0.5, file: Some("w.csv".into()) })),
             ("wave w.toml", Some(Command::Wave("w.toml".into()))),
             ("config write tuned.toml", Some(Command::WriteConfig("tuned.toml".into()))),
+            ("config code_max=4369", Some(Command::CodeLimits(vec![("code_max".into(), 4369)]))),
         ];
         for (line, command) in cases {
             assert_eq!(Command::parse(line), Ok(command), "{line}");
@@ -425,7 +436,9 @@ mod tests {
             ("can-i-go", "invalid command"),
             ("record arm 0", "1 or more"),
             ("record arm -1", "1 or more"),
-            ("config write", "invalid command"),
+            ("config write", "expected write SPEC, code_min=CODE"),
+            ("config code_max=-1", "found `code_max=-1`"),
+            ("config ki[2]=1e9", "expected write SPEC, code_min=CODE"),
             ("trigger 4 step=1e-6", "0 to 3"),
             ("trigger 0 kind=hold", "expected off, position"),
             ("trigger 0 step=1um", "expected a number in SI, found `1um`"),

@@ -26,7 +26,7 @@ use specgen_link::client::{ClientError, Port};
 use specgen_runtime::supervisor::Request;
 
 use crate::command::Command;
-use crate::session::{ALIVE, Session};
+use crate::session::{POLL_INTERVAL, Session};
 pub(crate) use answer::MachineStatus;
 use answer::{CommandError, Report};
 pub(crate) use error::SessionError;
@@ -50,7 +50,7 @@ pub struct Service {
     /// The address.
     pub listened: String,
     /// State of the machine at the end.
-    pub stands: String,
+    pub state: String,
 }
 
 impl Outcome for Service {}
@@ -173,7 +173,7 @@ fn lines(operator: &mut Operator<impl Port + 'static>, ui: &mut Ui) -> Result<()
         ui.progress(&format!("{}; commands, one a line; end with Ctrl-D", operator.state()));
     }
     loop {
-        match lines.recv_timeout(ALIVE) {
+        match lines.recv_timeout(POLL_INTERVAL) {
             Ok(text) => {
                 line(&text, operator, ui)?;
                 if std::mem::take(&mut operator.was_stopped) {

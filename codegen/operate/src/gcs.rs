@@ -62,10 +62,10 @@ pub fn serve<P: Port>(
     ending.map_err(|error| lost_link(name, &error))?;
     let mut operator = Operator::new(bridge.into_session(), stop);
     operator.alike = alike;
-    let stands = if operator.is_powered() {
+    let state = if operator.is_powered() {
         operator.ramp_down(ui).map_err(|error| lost_link(name, &error))?
     } else {
         operator.state()
     };
-    Ok(Service { device: name.to_owned(), listened: address.to_string(), stands })
+    Ok(Service { device: name.to_owned(), listened: address.to_string(), state })
 }

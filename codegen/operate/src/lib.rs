@@ -1,7 +1,7 @@
 //! A host that operates a machine over the link. It turns commands into requests, and keeps the link alive.
 //!
 //! ```text
-//! line ─► Command ─► Operator ─► Session ─ link ─► device (a board at a serial port, a program at a socket)
+//! text ─► Command ─► Operator ─► Session ─ link ─► device (a board at a serial port, a program at a socket)
 //!                                    └─ status, every 20 ms: after 0.1 s of silence a device holds
 //! ```
 //! [`commands`] executes the commands of `specgen operate`, [`panel`] those of a page in the browser. [`pil`] runs the host library
@@ -28,6 +28,6 @@ mod wave;
 
 pub use command::{Command, FrameRequest, ModeRequest, WaitCondition};
 pub use line::Line;
-pub use session::{ALIVE, FRESH, GAUGES, Place, Session};
+pub use session::{GAUGES, MAX_AGE, MeasuredPose, POLL_INTERVAL, Session};
 pub use socket::SocketLine;
 pub use wave::{read_wave, refused_wave};

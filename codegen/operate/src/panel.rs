@@ -156,7 +156,7 @@ pub fn serve<P: Port + 'static>(
     panel.borrow_mut().clients.publish(&json!({ "k": "end", "why": why }));
     // Gives the threads of the pages time to send it.
     std::thread::sleep(FRAME);
-    Ok(Service { device: name.to_owned(), listened: address.to_string(), stands: left? })
+    Ok(Service { device: name.to_owned(), listened: address.to_string(), state: left? })
 }
 
 /// Prints the address of the page.

@@ -16,12 +16,12 @@ use crate::motion::Motion;
 use crate::pil::{self, OpenError, OpenSession};
 
 /// Interval of requests to a device. It treats the link as lost after five times this interval.
-pub const ALIVE: Duration = Duration::from_millis(20);
+pub const POLL_INTERVAL: Duration = Duration::from_millis(20);
 /// How long a board may take to write the end of a record.
 const RECORD_END: Duration = Duration::from_secs(5);
 
 /// Largest age of a current state.
-pub const FRESH: Duration = Duration::from_millis(300);
+pub const MAX_AGE: Duration = Duration::from_millis(300);
 
 /// Status bits of gauges that were not read, or implausible.
 pub const GAUGES: u32 = 0x3f00;
@@ -42,16 +42,16 @@ macro_rules! expect {
     };
 }
 
-/// Place of a platform, m and rad.
+/// Pose, set-point and voltages of a platform; m and rad.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Place {
+pub struct MeasuredPose {
     /// Ticks since power-up.
     pub tick: u64,
     /// Number of `supervisor::Phase`.
     pub phase: u8,
     /// The controller's status word.
     pub status: u32,
-    /// Last measured pose, in the user's coordinates; see [`Place::measured`].
+    /// Last measured pose, in the user's coordinates; see [`MeasuredPose::measured`].
     pub pose: [f64; 6],
     /// Age of that pose; none if no pose was ever measured, and `pose` is meaningless.
     pub measured: Option<Duration>,
@@ -61,11 +61,11 @@ pub struct Place {
     pub voltage: [f64; 6],
 }
 
-impl Place {
+impl MeasuredPose {
     /// Whether the pose is current: the gauges were read and plausible in the last tick, which is recent.
     #[must_use]
     pub fn is_measured(&self) -> bool {
-        self.status & GAUGES == 0 && self.measured.is_some_and(|age| age < FRESH)
+        self.status & GAUGES == 0 && self.measured.is_some_and(|age| age < MAX_AGE)
     }
 }
 
@@ -169,8 +169,8 @@ impl<P: Port> Session<P> {
         Ok(&self.status)
     }
 
-    /// Place of the platform; none for six legs. A heartbeat.
-    pub fn place(&mut self) -> Result<Option<Place>, ClientError> {
+    /// Pose of the platform; none for six legs. A heartbeat.
+    pub fn place(&mut self) -> Result<Option<MeasuredPose>, ClientError> {
         let Some(motion) = &self.motion else { return Ok(None) };
         let Reply::Place { tick, phase, status, measured, words } = self.client.ask(&Request::Place)? else {
             return Err(ClientError::Unexpected);
@@ -186,7 +186,7 @@ impl<P: Port> Session<P> {
         let pose = motion.user(&shown).unwrap_or(shown);
         let measured = measured.map(Duration::from_micros);
         self.forget(phase);
-        Ok(Some(Place { tick, phase, status, pose, measured, target, voltage: six(3 * POSE) }))
+        Ok(Some(MeasuredPose { tick, phase, status, pose, measured, target, voltage: six(3 * POSE) }))
     }
 
     /// Resets the command words: a machine that is not running has discarded its command.
@@ -208,7 +208,7 @@ impl<P: Port> Session<P> {
 
     /// Time until the next request is due.
     pub fn due(&self) -> Duration {
-        ALIVE.saturating_sub(self.asked.elapsed())
+        POLL_INTERVAL.saturating_sub(self.asked.elapsed())
     }
 
     /// Requests a block of samples; a heartbeat.
@@ -310,7 +310,7 @@ impl<P: Port> Session<P> {
         let start = Instant::now();
         let mut status = self.recorder_status(action)?;
         while action == RecorderAction::Stop && status.running && start.elapsed() < RECORD_END {
-            std::thread::sleep(ALIVE);
+            std::thread::sleep(POLL_INTERVAL);
             status = self.recorder_status(RecorderAction::Look)?;
         }
         Ok(status)

@@ -55,11 +55,11 @@ def test_a_machine_is_operated(link: Path, tmp_path: Path) -> None:
     with pytest.raises(specgen.Error, match="digest"):
         specgen.Machine(socket=link, spec=LEGS)
     with specgen.Machine(socket=link, spec=REFERENCE) as machine:
-        assert machine.status()["stands"] == "disarmed"
+        assert machine.status()["state"] == "disarmed"
         with pytest.raises(specgen.Error, match="moves only while running"):
             machine.move(z=1e-6)
         with pytest.raises(specgen.Error, match="invalid command"):
-            machine.order("dance")
+            machine.execute("dance")
         machine.record()
         machine.arm()
         machine.wait("arming", 60)
@@ -70,7 +70,7 @@ def test_a_machine_is_operated(link: Path, tmp_path: Path) -> None:
         machine.wait("arrived", 60)
         # The session stays alive without commands.
         time.sleep(2)
-        assert machine.status()["stands"] == "running"
+        assert machine.status()["state"] == "running"
         assert machine.jog(z="1 um", rx=1e-6)[2] == pytest.approx(6e-6)
         machine.wait("arrived", 60)
         with pytest.raises(specgen.Error, match="no motion was started"):
@@ -118,7 +118,7 @@ def test_a_machine_is_operated(link: Path, tmp_path: Path) -> None:
         raise LookupError
     with specgen.Machine(socket=link) as machine:
         status = machine.status()
-        assert status["stands"] == "disarmed" and not status["amplifiers_on"]
+        assert status["state"] == "disarmed" and not status["amplifiers_on"]
         machine.stop()
     waited_for_end(link)
 

@@ -193,7 +193,7 @@ struct PhaseAt {
     cause: u8,
     amplifiers_on: bool,
     /// As text.
-    stands: String,
+    state: String,
 }
 
 impl Report {
@@ -201,7 +201,7 @@ impl Report {
         let phase = |change: &PhaseChange| {
             let word = MachineWord::of(u64::from(change.supervisor));
             let MachineWord { phase, cause, amplifier_on, .. } = word;
-            PhaseAt { tick: change.tick, phase, cause, amplifiers_on: amplifier_on, stands: word.to_string() }
+            PhaseAt { tick: change.tick, phase, cause, amplifiers_on: amplifier_on, state: word.to_string() }
         };
         Self {
             title,
@@ -237,7 +237,7 @@ impl Outcome for Report {
         let event = |out: &mut String, tick: u64, what: &str| {
             row(out, &columns, &[&tick, &format_args!("{:.4}", tick as f64 * self.period), &what]);
         };
-        for PhaseAt { tick, amplifiers_on, stands: phase, .. } in self.phases.iter().take(SHOWN) {
+        for PhaseAt { tick, amplifiers_on, state: phase, .. } in self.phases.iter().take(SHOWN) {
             let on = if *amplifiers_on { "on" } else { "off" };
             event(&mut out, *tick, &format!("{phase}, amplifiers {on}"));
         }

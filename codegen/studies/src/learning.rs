@@ -36,6 +36,6 @@ pub use passes::{
 pub use plan::Plan;
 pub use refusal::{NOWHERE, larger_limit, largest_correction, takes_correction};
 pub use response::{Bin, Response};
-pub use structure::{Place, StructuralMode, Structure};
+pub use structure::{Location, StructuralMode, Structure};
 pub use table::{Table, TableError, knots};
 pub use update::Update;

@@ -71,11 +71,11 @@ impl<'m, G: Gauges, A: Amplifiers, L: Lines> Board<'m, G, A, L> {
         L::COUNT.checked_sub(triggers::LINES).is_some(),
         "the spec has more [[trigger]] than this board has lines for"
     );
-    /// So has its input.
+    /// The input of the spec, if there is one, has a line.
     const HAS_INPUT: () =
         assert!(L::INPUT || !triggers::INPUT, "the spec has a [[trigger]] of kind \"input\", this board no input line");
 
-    /// At power-up, before [`Self::start`]: its converters, and a line for each trigger of the spec, `()` for none. `machine` is at reset;
+    /// At power-up, before [`Self::start`], with converters, and a line for each trigger of the spec (`()` for none). `machine` is at reset;
     /// `intact`: the result of `controller::integrity`.
     #[must_use]
     pub const fn with_lines(gauges: G, amplifiers: A, lines: L, machine: &'m mut Machine, intact: bool) -> Self {
@@ -120,7 +120,7 @@ impl<'m, G: Gauges, A: Amplifiers, L: Lines> Board<'m, G, A, L> {
     /// starts afresh.
     ///
     /// A new request to acknowledge starts the converters again while the amplifiers are off, whatever the cause: both
-    /// are tested before they get power again. The supervisor gets the request in the tick after that, when no reading
+    /// are tested before the amplifiers are enabled again. The supervisor gets the request in the tick after that, when no reading
     /// from before the start is left.
     pub fn tick(&mut self, exchange: &mut Exchange, noticed: TargetStatus) -> bool {
         self.timed_tick(exchange, noticed, || 0)
@@ -133,11 +133,11 @@ impl<'m, G: Gauges, A: Amplifiers, L: Lines> Board<'m, G, A, L> {
             self.stand_by(exchange, noticed);
             return false;
         }
-        let Exchange { orders, config, report, silence, recorder, orphaned, source, .. } = exchange;
-        let acknowledged = orders.request == Request::Acknowledge && self.request != Request::Acknowledge;
-        self.request = orders.request;
+        let Exchange { command, config, report, silence, recorder, orphaned, source, .. } = exchange;
+        let acknowledged = command.request == Request::Acknowledge && self.request != Request::Acknowledge;
+        self.request = command.request;
         let restart = acknowledged && !report.amplifier_on;
-        let request = match orders.request {
+        let request = match command.request {
             _ if restart => Request::None,
             _ if *orphaned => Request::RampDown,
             asked => asked,
@@ -151,7 +151,7 @@ impl<'m, G: Gauges, A: Amplifiers, L: Lines> Board<'m, G, A, L> {
         let begun = self.gauges.begin();
         let mut events = core::mem::take(&mut self.carried);
         // While the gauges are converted.
-        self.done(report, A::ask);
+        self.try_amplifiers(report, A::ask);
         for (happened, event) in [
             (noticed.missed > 0, MISSED_TICK),
             (noticed.missed > STALL_TICKS, STALLED),
@@ -182,20 +182,20 @@ impl<'m, G: Gauges, A: Amplifiers, L: Lines> Board<'m, G, A, L> {
                 self.carried |= CONVERTER;
             }));
         let seen = if rose { events | EDGE } else { events };
-        let input = take(&mut self.input, orders, &readings, request, seen);
+        let input = take(&mut self.input, command, &readings, request, seen);
         let output = exchange::step(config, self.machine, input);
 
         // Off before the codes change; on only after they are written.
         if !output.amplifier_on {
-            self.done(report, |amplifiers| amplifiers.enable(false));
+            self.try_amplifiers(report, |amplifiers| amplifiers.enable(false));
         }
         self.codes = Some(output.tick.dac_code);
-        self.done(report, |amplifiers| amplifiers.write(&output.tick.dac_code));
+        self.try_amplifiers(report, |amplifiers| amplifiers.write(&output.tick.dac_code));
         self.show(report, triggers::lines(output.tick.status));
         report.record_output(now().wrapping_sub(sampled));
-        // Converters that did not respond get no power, whatever the supervisor knows.
+        // Never enable the amplifiers while a converter has not started, whatever the supervisor says.
         if output.amplifier_on && self.started {
-            self.done(report, |amplifiers| amplifiers.enable(true));
+            self.try_amplifiers(report, |amplifiers| amplifiers.enable(true));
         }
 
         report.tick += 1;
@@ -215,8 +215,8 @@ impl<'m, G: Gauges, A: Amplifiers, L: Lines> Board<'m, G, A, L> {
             record_after(self.machine, input, &output, recorder);
         }
         if passes::POSSIBLE {
-            let Exchange { source, orders, .. } = exchange;
-            source.keep_pass(&self.machine.state, output.tick.status, &mut orders.command);
+            let Exchange { source, command, .. } = exchange;
+            source.keep_pass(&self.machine.state, output.tick.status, &mut command.command);
         }
         if let Some(samples) = &mut exchange.samples {
             // Missed ticks count, too.
@@ -231,9 +231,9 @@ impl<'m, G: Gauges, A: Amplifiers, L: Lines> Board<'m, G, A, L> {
     /// board resume.
     fn stand_by(&mut self, exchange: &mut Exchange, noticed: TargetStatus) {
         let report = &mut exchange.report;
-        self.done(report, |amplifiers| amplifiers.enable(false));
+        self.try_amplifiers(report, |amplifiers| amplifiers.enable(false));
         if let Some(codes) = self.codes {
-            self.done(report, |amplifiers| amplifiers.write(&codes));
+            self.try_amplifiers(report, |amplifiers| amplifiers.write(&codes));
         }
         self.show(report, 0);
         report.tick += 1;
@@ -259,7 +259,7 @@ impl<'m, G: Gauges, A: Amplifiers, L: Lines> Board<'m, G, A, L> {
         }
     }
 
-    /// What the controller remembers.
+    /// State of the controller.
     #[must_use]
     pub const fn machine(&self) -> &Machine {
         self.machine
@@ -271,7 +271,7 @@ impl<'m, G: Gauges, A: Amplifiers, L: Lines> Board<'m, G, A, L> {
     }
 
     /// Performs an amplifier operation; a fault is an event of the next tick.
-    fn done(&mut self, report: &mut Report, action: impl FnOnce(&mut A) -> Result<(), Fault>) {
+    fn try_amplifiers(&mut self, report: &mut Report, action: impl FnOnce(&mut A) -> Result<(), Fault>) {
         if let Err(fault) = action(&mut self.amplifiers) {
             report.converter(fault);
             self.carried |= CONVERTER;
@@ -283,10 +283,10 @@ impl<'m, G: Gauges, A: Amplifiers, L: Lines> Board<'m, G, A, L> {
 #[inline(never)]
 fn take<'a>(
     slot: &'a mut Option<MachineInput>,
-    orders: &TickCommand,
+    command: &TickCommand,
     readings: &[Real; CHANNELS],
     request: Request,
     events: u32,
 ) -> &'a MachineInput {
-    slot.insert(measured_input(&orders.command, readings, &[Real::NAN; CHANNELS], request, events))
+    slot.insert(measured_input(&command.command, readings, &[Real::NAN; CHANNELS], request, events))
 }

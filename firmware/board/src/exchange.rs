@@ -22,7 +22,7 @@ use crate::words::PERIOD_NANOSECONDS;
 #[cfg(feature = "lockstep")]
 const LOCKSTEP_TIMEOUT: u32 = 2_000_000_000;
 
-/// Command of the background to the next ticks.
+/// Command for the next ticks, from the host.
 #[derive(Debug, Clone, Copy)]
 pub struct TickCommand {
     /// Input words of the controller, without the measured ones.
@@ -34,13 +34,13 @@ pub struct TickCommand {
 /// Commands in one direction, reports in the other. Its lock holds off the tick: copy and release.
 #[derive(Debug)]
 pub struct Exchange {
-    /// What is wanted.
-    pub orders: TickCommand,
+    /// Command for the next ticks, from the host.
+    pub command: TickCommand,
     /// Settings in force.
     pub config: Config,
     /// New settings, which take effect after the next tick, see [`Exchange::prepare`].
     pub next: Option<Config>,
-    /// Its status.
+    /// State of the machine after the last tick.
     pub report: Report,
     /// Probes of times and stack.
     pub probes: Probes,
@@ -80,7 +80,7 @@ impl Exchange {
     #[must_use]
     pub const fn new() -> Self {
         Self {
-            orders: TickCommand { command: [0; COMMAND_WORDS], request: Request::None },
+            command: TickCommand { command: [0; COMMAND_WORDS], request: Request::None },
             config: Config::new(),
             next: None,
             report: Report::NONE,
@@ -165,7 +165,7 @@ impl Exchange {
                 }
             }
         }
-        let Self { orders: TickCommand { command, .. }, report, .. } = self;
+        let Self { command: TickCommand { command, .. }, report, .. } = self;
         let phase = report.phase;
         if triggers::INPUT {
             self.source.begin_awaited(report.tick - 1, phase, report.status, &self.config, command);
@@ -204,7 +204,7 @@ impl Exchange {
     /// If the machine does not run at rest, a wave or a pass is under way, or the pass is invalid or too long.
     pub(crate) fn begin_pass(&mut self, course: Course) -> Result<(), Refusal> {
         let runs = self.report.phase == Phase::Running && !self.in_lockstep() && !self.source.is_engaged();
-        if !runs || self.away.is_some() || !passes::may_begin(self.report.status, &self.orders.command) {
+        if !runs || self.away.is_some() || !passes::may_begin(self.report.status, &self.command.command) {
             return Err(Refusal::State);
         }
         let player = self.source.player.as_mut().ok_or(Refusal::Unsupported)?;
@@ -212,13 +212,13 @@ impl Exchange {
             return Err(Refusal::Word { index: 0 });
         }
         self.source.cancel_awaited();
-        self.source.advance_pass(Phase::Running, &mut self.orders.command);
+        self.source.advance_pass(Phase::Running, &mut self.command.command);
         Ok(())
     }
 
     /// Ends the pass under way, if there is one, and its correction.
     pub(crate) fn abort_pass(&mut self) {
-        self.source.abort_pass(&mut self.orders.command);
+        self.source.abort_pass(&mut self.command.command);
     }
 
     /// Whether the host steps the machine. Always false in a program without the feature: the compiler then drops its
@@ -235,7 +235,7 @@ impl Exchange {
             let mut silence = Silence::new(LOCKSTEP_TIMEOUT.div_ceil(PERIOD_NANOSECONDS));
             silence.heard();
             self.lockstep = Some(silence);
-            self.orders.request = Request::None;
+            self.command.request = Request::None;
             self.source.wave = None;
             self.abort_pass();
         }

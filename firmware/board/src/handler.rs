@@ -143,7 +143,7 @@ impl Backend for RequestContext<'_, '_> {
         self.handler.session.end();
         (self.with)(&mut |exchange, machine| {
             // A new session has no request yet.
-            exchange.orders.request = Wanted::None;
+            exchange.command.request = Wanted::None;
             exchange.leave_lockstep(machine);
             exchange.source.stop_wave();
             exchange.abort_pass();
@@ -179,7 +179,7 @@ impl Backend for RequestContext<'_, '_> {
 
     fn supervise(&mut self, request: Wanted) -> Result<(), Refusal> {
         self.change_command(|exchange| {
-            exchange.orders.request = request;
+            exchange.command.request = request;
             true
         })
     }
@@ -190,7 +190,7 @@ impl Backend for RequestContext<'_, '_> {
             let free = !exchange.source.is_engaged() && exchange.report.phase == Phase::Running;
             if free {
                 exchange.source.cancel_awaited();
-                exchange.orders.command = *command;
+                exchange.command.command = *command;
             }
             free
         })
@@ -260,7 +260,7 @@ impl Backend for RequestContext<'_, '_> {
         }
         wave.start();
         self.change_command(|exchange| {
-            let (status, command) = (exchange.report.status, &exchange.orders.command);
+            let (status, command) = (exchange.report.status, &exchange.command.command);
             let may = exchange.report.phase == Phase::Running
                 && !exchange.source.is_engaged()
                 && waves::may_begin(status, command, &settings.center, &limits).is_ok();

@@ -9,7 +9,7 @@
 //! A law knows a spec by the constants and types of a trait: [`Spec`] for both laws, [`platform::Platform`] and
 //! [`legs::SixLegs`] for one of them. An emitted controller implements the trait with constants ([`ConstSpec`] adds the
 //! sizes of its memory), and [`controller!`] gives it its public names. The constants are passed by value: a zero-sized
-//! type in an emitted controller, a reference if they are read at run time.
+//! type in an emitted controller, a reference in the crate `run-time`, which reads them from the compiled spec.
 //!
 //! No panic path, no allocation; the rules of `specgen_runtime` apply here, too.
 

@@ -15,7 +15,7 @@ use specgen_runtime::wave::Settings;
 
 use crate::capture::{CAPACITY, Capture};
 use crate::handover::{LoopCommand, Player, Row};
-use crate::operator::{Operator, SupervisorReport};
+use crate::operator::{Arbiter, SupervisorReport};
 use crate::passes::Passes;
 use crate::words::Command;
 
@@ -23,7 +23,7 @@ use crate::words::Command;
 const MOST_ORDERS: usize = 64;
 
 pub struct Console {
-    pub operator: Operator,
+    pub operator: Arbiter,
     pub capture: Capture,
     pub passes: Passes,
     pub said: Option<SupervisorReport>,
@@ -53,7 +53,7 @@ pub struct Console {
 
 impl Console {
     /// At the start, with the settings of the run.
-    pub fn new(operator: Operator, capture: Capture, config: Config) -> Self {
+    pub fn new(operator: Arbiter, capture: Capture, config: Config) -> Self {
         let health = Health::default();
         Self {
             operator,
@@ -163,7 +163,7 @@ impl Console {
             .map_err(|_| Refusal::State)?;
         // The command after the wave is sent first.
         self.operator.rest_at(&settings.center);
-        self.wish();
+        self.take_pending();
         if on_edge {
             let number = self.order(LoopCommand::Await(EdgeCommand::Wave, Some(wave)));
             self.awaited = Some((number, None));
@@ -184,7 +184,7 @@ impl Console {
         if !rests || self.is_engaged() {
             return Err(Refusal::State);
         }
-        self.wish();
+        self.take_pending();
         let number = self.order(LoopCommand::Await(EdgeCommand::Command(command), None));
         self.awaited = Some((number, Some(command)));
         Ok(())
@@ -223,7 +223,7 @@ impl Console {
             return Err(Refusal::State);
         }
         let player = self.passes.begin(course).ok_or(Refusal::Word { index: 0 })?;
-        self.wish();
+        self.take_pending();
         self.order(LoopCommand::Pass(player));
         Ok(())
     }
@@ -276,8 +276,8 @@ impl Console {
     }
 
     /// Queues the operator's request, if it changed.
-    pub fn wish(&mut self) {
-        if let Some(wish) = self.operator.wish() {
+    pub fn take_pending(&mut self) {
+        if let Some(wish) = self.operator.take_pending() {
             self.order(LoopCommand::Request(wish));
         }
     }
@@ -299,7 +299,7 @@ mod tests {
     use controller::supervised::Request;
 
     fn console(phase: Phase) -> Console {
-        let operator = Operator::new(true, Timeout { silence: 1, idle: 1 });
+        let operator = Arbiter::new(true, Timeout { silence: 1, idle: 1 });
         let mut console = Console::new(operator, Capture::new(None).unwrap().0, Config::new());
         console.said = Some(said(phase));
         console
@@ -335,7 +335,7 @@ mod tests {
     #[test]
     fn a_stop_takes_back_what_would_move_and_leaves_the_numbers() {
         let mut console = console(Phase::Running);
-        console.operator.wish();
+        console.operator.take_pending();
         console.order(LoopCommand::Trigger);
         console
             .order(LoopCommand::Request(OperatorRequest { command: Some([7; COMMAND_WORDS]), request: Request::Run }));
@@ -468,8 +468,8 @@ mod tests {
         }
         assert!(console.is_full());
         console.outgoing().0.clear();
-        console.wish();
-        console.wish();
+        console.take_pending();
+        console.take_pending();
         assert!(matches!(console.outgoing(), (orders, 65) if orders.len() == 1));
         let config = Config::new();
         console.configure(config);

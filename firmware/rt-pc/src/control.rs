@@ -192,7 +192,7 @@ impl<D: Device> Loop<'_, D> {
             if let Ok(order) = orders.pop() {
                 keeper.ordered();
                 match order {
-                    LoopCommand::Request(wish) => setpoints.wish(wish),
+                    LoopCommand::Request(wish) => setpoints.accept(wish),
                     LoopCommand::Configure(config) => (self.config, configured) = (config, true),
                     LoopCommand::Wave(wave) => setpoints.start(wave),
                     LoopCommand::StopWave => setpoints.stop(),

@@ -45,7 +45,7 @@ use control::{Loop, Timing};
 use devices::Device;
 use devices::simulated::SimulatedDevices;
 use handover::Shared;
-use operator::{Operator, Timeout};
+use operator::{Arbiter, Timeout};
 use options::{Invocation, Options};
 use service::{Link, Service};
 use summary::Summary;
@@ -153,7 +153,7 @@ fn run<D: Device + Send>(options: &Options, device: &mut D, signal: Arc<AtomicBo
     let (timing, timeout) = times(options, period);
     // A host or a time limit ends it, not a fault.
     let attended = options.link.is_some() || options.duration.is_some();
-    let mut operator = Operator::new(attended, timeout);
+    let mut operator = Arbiter::new(attended, timeout);
     if options.arm {
         operator.plan(&options.set, clock::now()).map_err(|error| usage(format!("--set: {error}")))?;
     }

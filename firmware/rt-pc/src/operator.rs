@@ -1,7 +1,7 @@
 //! Requests to the machine: by the command line's plan, over the link, by signals.
 //!
 //! There is a single state for all sources. A host that has sent a command is in control as long as it is not silent
-//! and keeps sending commands; other hosts can then only slow the machine down. An operator only requests: the
+//! and keeps sending commands; other hosts can then only slow the machine down. The arbiter only requests: the
 //! supervisor decides, and each step here waits for its answer.
 
 use controller::supervised::{Cause, Finding, MACHINE_INPUT_NAMES, Phase, Request};
@@ -99,7 +99,7 @@ enum Step {
 }
 
 #[derive(Debug)]
-pub struct Operator {
+pub struct Arbiter {
     command: Command,
     request: Request,
     step: Step,
@@ -108,7 +108,7 @@ pub struct Operator {
     assignments: Vec<(usize, u64)>,
     /// Reason why the plan failed.
     pub failure: Option<String>,
-    /// Since the last wish.
+    /// Since the last [`Arbiter::take_pending`].
     changed: bool,
     commanded: bool,
     owner: Owner,
@@ -116,16 +116,16 @@ pub struct Operator {
     /// The host that lost control last.
     evicted: Option<HostId>,
     timeout: Timeout,
-    /// Another host stopped the machine while it was armed, in a way that the owner's replies do not show.
+    /// Another host stopped the machine while it was arming; the owner's replies do not show it.
     is_overruled: bool,
     /// Phase of the machine at the last check.
     phase: Phase,
-    /// An operator is present: after a fault the loop continues instead of ending.
+    /// A person watches: after a fault the loop continues in *faulted* instead of ending.
     attended: bool,
 }
 
-impl Operator {
-    /// An operator without a plan. If the plan fails, the loop continues if it is `attended`, otherwise it ends.
+impl Arbiter {
+    /// Without a plan. If a plan fails, the loop continues if it is `attended`, otherwise it ends.
     #[must_use]
     pub fn new(attended: bool, timeout: Timeout) -> Self {
         Self {
@@ -228,7 +228,7 @@ impl Operator {
 
     /// Whether a host is in control: it is not silent, and has sent a command recently.
     #[must_use]
-    pub fn linked(&self, now: u64) -> bool {
+    pub fn host_in_control(&self, now: u64) -> bool {
         match self.owner {
             Owner::Here => false,
             Owner::Host { seen, ordered, left, .. } => {
@@ -239,13 +239,13 @@ impl Operator {
     }
 
     /// Whether the silence of the link matters: a host has sent a command.
-    fn is_links(&self) -> bool {
+    fn is_host_owned(&self) -> bool {
         matches!(self.owner, Owner::Host { .. })
     }
 
     /// Whether this host sent the last command.
     #[must_use]
-    pub fn is_hosts(&self, host: HostId) -> bool {
+    pub fn is_owner(&self, host: HostId) -> bool {
         matches!(self.owner, Owner::Host { id, .. } if id == host)
     }
 
@@ -257,8 +257,8 @@ impl Operator {
 
     /// Changes with every request of the host in control; 0 if no host's silence matters.
     #[must_use]
-    pub fn link_number(&self) -> u64 {
-        if self.is_links() { self.requests } else { 0 }
+    pub fn heartbeat(&self) -> u64 {
+        if self.is_host_owned() { self.requests } else { 0 }
     }
 
     /// A host sent a request.
@@ -273,7 +273,7 @@ impl Operator {
 
     /// A host connects: requests of a host that is gone are not continued for it.
     pub fn connected(&mut self, host: HostId, now: u64) {
-        if self.is_links() && self.may_order(host, now) && !self.is_ending() {
+        if self.is_host_owned() && self.may_take_control(host, now) && !self.is_ending() {
             self.ask(Request::None);
         }
     }
@@ -292,8 +292,8 @@ impl Operator {
 
     /// Whether no other host is in control.
     #[must_use]
-    pub fn may_order(&self, host: HostId, now: u64) -> bool {
-        self.is_hosts(host) || !self.linked(now)
+    pub fn may_take_control(&self, host: HostId, now: u64) -> bool {
+        self.is_owner(host) || !self.host_in_control(now)
     }
 
     /// Gives control to a host.
@@ -304,10 +304,11 @@ impl Operator {
         if self.is_ending() {
             return Err(ControlRefusal::Ending);
         }
-        if !self.may_order(host, now) || std::mem::take(&mut self.is_overruled) && self.is_hosts(host) {
+        // An overruled owner is refused once: reading the flag clears it.
+        if !self.may_take_control(host, now) || std::mem::take(&mut self.is_overruled) && self.is_owner(host) {
             return Err(ControlRefusal::Others);
         }
-        if !self.is_hosts(host) {
+        if !self.is_owner(host) {
             self.requests += 1;
             // A host that was in control must reconnect.
             if let Owner::Host { id, .. } = self.owner {
@@ -319,11 +320,11 @@ impl Operator {
         Ok(())
     }
 
-    /// A request of a host: it must be in control, or slow the machine down.
+    /// A request of a host. The caller has checked that it is in control, or slows the machine down.
     pub fn ask_by_link(&mut self, request: Request, host: HostId) {
         let rises = matches!(self.phase, Phase::Disarmed | Phase::Arming)
             && matches!(self.request, Request::Arm | Request::Run);
-        self.is_overruled = rises && self.is_links() && !self.is_hosts(host);
+        self.is_overruled = rises && self.is_host_owned() && !self.is_owner(host);
         self.ask(request);
     }
 
@@ -357,7 +358,7 @@ impl Operator {
     }
 
     /// The request for the loop, if it changed since the last call.
-    pub fn wish(&mut self) -> Option<OperatorRequest> {
+    pub fn take_pending(&mut self) -> Option<OperatorRequest> {
         let command = std::mem::take(&mut self.commanded).then_some(self.command);
         std::mem::take(&mut self.changed).then_some(OperatorRequest { command, request: self.request })
     }
@@ -415,28 +416,28 @@ mod tests {
         }
     }
 
-    fn operator() -> Operator {
-        Operator::new(false, Timeout { silence: SILENCE, idle: IDLE })
+    fn operator() -> Arbiter {
+        Arbiter::new(false, Timeout { silence: SILENCE, idle: IDLE })
     }
 
     #[test]
     fn the_plan_arms_runs_plays_and_goes_down() {
         let mut operator = operator();
         operator.plan(&["setpoint[0]=1e-6".to_owned()], 0).unwrap();
-        assert_eq!(operator.wish().unwrap().request, Request::Arm);
+        assert_eq!(operator.take_pending().unwrap().request, Request::Arm);
         operator.update(&said(Phase::Disarmed, false), 1);
-        assert!(operator.wish().is_none());
+        assert!(operator.take_pending().is_none());
         operator.update(&said(Phase::Arming, true), 1);
-        assert_eq!(operator.wish().unwrap().request, Request::Run);
+        assert_eq!(operator.take_pending().unwrap().request, Request::Run);
         operator.update(&said(Phase::Arming, true), 1);
-        assert!(operator.wish().is_none());
+        assert!(operator.take_pending().is_none());
         operator.update(&said(Phase::Running, true), 2);
-        let wish = operator.wish().unwrap();
+        let wish = operator.take_pending().unwrap();
         let index = place("setpoint[0]").unwrap();
         assert_eq!(wish.request, Request::None);
         assert_eq!(wish.command.unwrap()[index], word_of(index, 1e-6).unwrap());
         operator.ramp_down(3);
-        assert_eq!(operator.wish().unwrap().request, Request::RampDown);
+        assert_eq!(operator.take_pending().unwrap().request, Request::RampDown);
         operator.update(&said(Phase::RampingDown, true), 4);
         assert!(!operator.is_over());
         operator.update(&said(Phase::Disarmed, false), 5);
@@ -457,7 +458,7 @@ mod tests {
 
     #[test]
     fn an_attended_loop_does_not_end_at_a_fault() {
-        let mut operator = Operator::new(true, Timeout { silence: SILENCE, idle: IDLE });
+        let mut operator = Arbiter::new(true, Timeout { silence: SILENCE, idle: IDLE });
         operator.plan(&[], 0).unwrap();
         operator.update(&said(Phase::Faulted, false), 1);
         operator.update(&said(Phase::Faulted, false), 2);
@@ -479,7 +480,7 @@ mod tests {
             let mut operator = operator();
             let error = operator.plan(&[assignment.to_owned()], 0).unwrap_err();
             assert!(error.contains(expected), "{assignment}: {error}");
-            assert_eq!(operator.wish().unwrap().request, Request::None, "{assignment}: nothing is asked for");
+            assert_eq!(operator.take_pending().unwrap().request, Request::None, "{assignment}: nothing is asked for");
         }
     }
 
@@ -488,27 +489,31 @@ mod tests {
         let mut operator = operator();
         operator.seen(A, 0);
         operator.left(A, None);
-        assert!(!operator.linked(1) && operator.link_number() == 0, "one that only looks has no orders");
+        assert!(!operator.host_in_control(1) && operator.heartbeat() == 0, "one that only looks has no orders");
         operator.take_for_host(A, 10).unwrap();
         operator.ask_by_link(Request::Run, A);
-        assert!(operator.link_number() > 0 && operator.wish().unwrap().request == Request::Run);
+        assert!(operator.heartbeat() > 0 && operator.take_pending().unwrap().request == Request::Run);
         assert_eq!(operator.take_for_host(B, 10 + SILENCE), Err(ControlRefusal::Others));
-        assert!(operator.linked(20) && !operator.is_evicted(A));
+        assert!(operator.host_in_control(20) && !operator.is_evicted(A));
         operator.seen(A, 200);
-        let number = operator.link_number();
+        let number = operator.heartbeat();
         operator.seen(B, 250);
-        assert_eq!(operator.link_number(), number, "another host is not the one that is missed");
+        assert_eq!(operator.heartbeat(), number, "another host is not the one that is missed");
         // Silent while something moves: it is missed until another host takes over.
-        assert!(operator.linked(200 + SILENCE) && !operator.linked(201 + SILENCE) && operator.link_number() > 0);
+        assert!(
+            operator.host_in_control(200 + SILENCE)
+                && !operator.host_in_control(201 + SILENCE)
+                && operator.heartbeat() > 0
+        );
         operator.take_for_host(B, 500).unwrap();
-        assert!(operator.is_evicted(A) && operator.link_number() != number);
+        assert!(operator.is_evicted(A) && operator.heartbeat() != number);
         // Gone while something moves: missed, and every other host may take over at once.
         operator.left(B, Some(&said(Phase::Running, true)));
-        assert!(operator.link_number() > 0 && !operator.linked(600));
+        assert!(operator.heartbeat() > 0 && !operator.host_in_control(600));
         // Gone while nothing can move: not missed.
         operator.take_for_host(A, 600).unwrap();
         operator.left(A, Some(&said(Phase::Disarmed, false)));
-        assert_eq!(operator.link_number(), 0);
+        assert_eq!(operator.heartbeat(), 0);
         operator.ramp_down(700);
         assert_eq!(operator.take_for_host(A, 701), Err(ControlRefusal::Ending));
     }
@@ -521,11 +526,11 @@ mod tests {
             operator.update(&said(phase, true), 1);
         }
         operator.command[0] = 2;
-        assert!(operator.wish().is_some());
+        assert!(operator.take_pending().is_some());
         operator.update(&said(Phase::Running, true), 2);
-        assert!(operator.wish().is_none());
+        assert!(operator.take_pending().is_none());
         operator.update(&said(Phase::Holding, true), 3);
-        assert_eq!(operator.wish().unwrap().command.unwrap()[0], 0);
+        assert_eq!(operator.take_pending().unwrap().command.unwrap()[0], 0);
     }
 
     #[test]
@@ -554,9 +559,9 @@ mod tests {
         assert_eq!(operator.take_for_host(B, IDLE), Err(ControlRefusal::Others));
         operator.seen(A, IDLE + 1);
         // It still has them while no other asks, and its silence would be noticed.
-        assert!(operator.is_hosts(A) && operator.link_number() > 0);
+        assert!(operator.is_owner(A) && operator.heartbeat() > 0);
         operator.take_for_host(B, IDLE + 1).unwrap();
-        assert!(operator.is_evicted(A) && operator.is_hosts(B));
+        assert!(operator.is_evicted(A) && operator.is_owner(B));
     }
 
     const ATTENDED: Timeout = Timeout { silence: SILENCE, idle: IDLE };
@@ -571,9 +576,9 @@ mod tests {
             operator.plan(&[], 7).unwrap();
             operator.update(&said(first, true), 7);
             operator.update(&said(phase, true), 7 + limit);
-            assert_eq!((operator.wish().unwrap().request, operator.failure.is_some()), (asked, false));
+            assert_eq!((operator.take_pending().unwrap().request, operator.failure.is_some()), (asked, false));
             operator.update(&said(phase, true), 8 + limit);
-            assert_eq!(operator.wish().unwrap().request, Request::RampDown);
+            assert_eq!(operator.take_pending().unwrap().request, Request::RampDown);
             let failure = operator.failure.clone().unwrap();
             assert!(failure.contains(&format!("still {} after 120 s", phase.name())), "{failure}");
             // On the way down it is waited for as well, for a shorter time.
@@ -594,14 +599,14 @@ mod tests {
         for phase in [Phase::Disarmed, Phase::Faulted] {
             let mut operator = operator();
             operator.ramp_down(0);
-            assert_eq!(operator.wish().unwrap().request, Request::RampDown);
+            assert_eq!(operator.take_pending().unwrap().request, Request::RampDown);
             operator.update(&said(phase, true), 1);
             assert!(!operator.is_over() && operator.is_ending());
             operator.ramp_down(1);
-            assert!(operator.wish().is_none(), "once");
+            assert!(operator.take_pending().is_none(), "once");
             operator.update(&said(phase, false), 1);
             assert!(operator.is_over());
-            assert_eq!(operator.wish().unwrap().request, Request::None);
+            assert_eq!(operator.take_pending().unwrap().request, Request::None);
         }
     }
 
@@ -610,40 +615,40 @@ mod tests {
         let mut operator = operator();
         operator.plan(&["setpoint[0]=1e-6".to_owned()], 0).unwrap();
         operator.update(&said(Phase::Running, true), 1);
-        let wish = operator.wish().unwrap();
+        let wish = operator.take_pending().unwrap();
         assert!(wish.request == Request::None && wish.command.unwrap() != [0; COMMAND_WORDS]);
         let mut operator = self::operator();
         operator.plan(&[], 0).unwrap();
         operator.take_for_host(A, 0).unwrap();
         operator.ask_by_link(Request::Hold, A);
         operator.update(&said(Phase::Faulted, true), 1);
-        assert!(operator.failure.is_none() && operator.wish().unwrap().request == Request::Hold);
+        assert!(operator.failure.is_none() && operator.take_pending().unwrap().request == Request::Hold);
     }
 
     #[test]
     fn what_a_host_that_has_gone_asked_for_is_not_asked_for_on_behalf_of_the_next() {
         let connected = |owner: Option<HostId>, now: u64| {
-            let mut operator = Operator::new(true, ATTENDED);
+            let mut operator = Arbiter::new(true, ATTENDED);
             if let Some(owner) = owner {
                 operator.take_for_host(owner, 0).unwrap();
                 operator.ask_by_link(Request::Run, owner);
             } else {
                 operator.plan(&[], 0).unwrap();
             }
-            operator.wish();
+            operator.take_pending();
             operator.connected(B, now);
-            operator.wish().map(|wish| wish.request)
+            operator.take_pending().map(|wish| wish.request)
         };
         assert_eq!(connected(Some(A), SILENCE), None, "it is still there");
         assert_eq!(connected(Some(A), SILENCE + 1), Some(Request::None));
         assert_eq!(connected(Some(B), 0), Some(Request::None), "it reconnects by itself");
         assert_eq!(connected(None, SILENCE + 1), None, "a plan goes on");
-        let mut operator = Operator::new(true, ATTENDED);
+        let mut operator = Arbiter::new(true, ATTENDED);
         operator.take_for_host(A, 0).unwrap();
         operator.ramp_down(1);
-        operator.wish();
+        operator.take_pending();
         operator.connected(B, SILENCE + 1);
-        assert!(operator.wish().is_none(), "the way down goes on");
+        assert!(operator.take_pending().is_none(), "the way down goes on");
     }
 
     #[test]
@@ -658,9 +663,9 @@ mod tests {
             let mut operator = operator();
             operator.take_for_host(A, 0).unwrap();
             operator.left(who, last.as_ref());
-            assert_eq!(operator.link_number() == 0, forgotten, "{last:?}");
-            assert_eq!(operator.linked(1), who == B);
-            assert_eq!(operator.is_hosts(A), !forgotten);
+            assert_eq!(operator.heartbeat() == 0, forgotten, "{last:?}");
+            assert_eq!(operator.host_in_control(1), who == B);
+            assert_eq!(operator.is_owner(A), !forgotten);
         }
     }
 
@@ -668,15 +673,15 @@ mod tests {
     fn a_number_comes_with_every_request_of_the_owner() {
         let mut operator = operator();
         operator.take_for_host(A, 0).unwrap();
-        let first = operator.link_number();
+        let first = operator.heartbeat();
         operator.seen(A, 1);
         operator.seen(A, 2);
-        assert_eq!(operator.link_number(), first + 2);
+        assert_eq!(operator.heartbeat(), first + 2);
         operator.take_for_host(A, 3).unwrap();
-        assert_eq!(operator.link_number(), first + 2);
+        assert_eq!(operator.heartbeat(), first + 2);
         operator.left(A, Some(&said(Phase::Running, true)));
         operator.take_for_host(B, 4).unwrap();
-        assert_eq!(operator.link_number(), first + 3);
+        assert_eq!(operator.heartbeat(), first + 3);
     }
 
     #[test]
@@ -705,17 +710,17 @@ mod tests {
     #[test]
     fn a_command_goes_out_with_a_wish_once() {
         let mut operator = operator();
-        assert!(operator.wish().unwrap().command.is_some() && operator.wish().is_none());
+        assert!(operator.take_pending().unwrap().command.is_some() && operator.take_pending().is_none());
         operator.ask(Request::Arm);
-        assert!(operator.wish().is_some_and(|wish| wish.command.is_none() && wish.request == Request::Arm));
+        assert!(operator.take_pending().is_some_and(|wish| wish.command.is_none() && wish.request == Request::Arm));
         operator.set_by_link([4; COMMAND_WORDS]);
-        assert_eq!((operator.command()[7], operator.wish().unwrap().command), (4, Some([4; COMMAND_WORDS])));
+        assert_eq!((operator.command()[7], operator.take_pending().unwrap().command), (4, Some([4; COMMAND_WORDS])));
         operator.has_begun(9);
-        assert_eq!(operator.wish().unwrap().command.unwrap()[..2], [3, 9]);
+        assert_eq!(operator.take_pending().unwrap().command.unwrap()[..2], [3, 9]);
         operator.rest_at(&[0.0; 6]);
-        assert_eq!(operator.wish().unwrap().command.unwrap()[0], 0);
+        assert_eq!(operator.take_pending().unwrap().command.unwrap()[0], 0);
         operator.has_begun_at_edge(&[6; COMMAND_WORDS]);
-        assert!(operator.command()[2] == 6 && operator.wish().is_none(), "the loop has it");
+        assert!(operator.command()[2] == 6 && operator.take_pending().is_none(), "the loop has it");
     }
 
     #[test]

@@ -100,13 +100,13 @@ impl Service<'_> {
             self.console.health = self.shared.health();
             link.serve(&mut self.console, now);
         }
-        let number = self.console.operator.link_number();
+        let number = self.console.operator.heartbeat();
         self.shared.link.store(number, Ordering::Relaxed);
     }
 
     /// Sends queued commands, as far as there is room.
     fn send(&mut self) {
-        self.console.wish();
+        self.console.take_pending();
         let (orders, mut number) = self.console.outgoing();
         while self.rings.orders.slots() > 0 {
             let Some(order) = orders.pop_front() else { break };
@@ -192,7 +192,7 @@ mod tests {
     use crate::bench::row;
     use crate::capture::Capture;
     use crate::handover::{Inner, SNAPSHOT_EVERY, Snapshot, rings};
-    use crate::operator::{Operator, Timeout};
+    use crate::operator::{Arbiter, Timeout};
     use controller::Config;
     use controller::snapshot::MACHINE_STATE_WORDS;
     use controller::supervised::Request;
@@ -208,7 +208,7 @@ mod tests {
         until: Option<u64>,
     ) -> (Service<'a>, Inner, Option<PathBuf>) {
         let (inner, rings) = rings(record.is_some());
-        let operator = Operator::new(true, Timeout { silence: SECOND, idle: SECOND });
+        let operator = Arbiter::new(true, Timeout { silence: SECOND, idle: SECOND });
         let console = Console::new(operator, Capture::new(None).unwrap().0, Config::new());
         let path = record.map(|name| std::env::temp_dir().join(format!("rt-pc-{name}-{}", std::process::id())));
         let record = path.clone().map(|path| {
@@ -290,7 +290,7 @@ mod tests {
         service.console.operator.take_for_host(crate::operator::HostId(1), 0).unwrap();
         service.serve(0);
         let number = shared.link.load(Ordering::Relaxed);
-        assert!(number > 0 && number == service.console.operator.link_number());
+        assert!(number > 0 && number == service.console.operator.heartbeat());
         let start = clock::now();
         service.wait();
         assert!(clock::now() - start >= ROUND.tv_nsec as u64 / 2);
@@ -326,7 +326,7 @@ mod tests {
         let mut words = Config::new().to_words();
         let gain = controller::CONFIG_NAMES.iter().position(|name| *name == "kp[0]").unwrap();
         words[gain] = crate::words::word(0.0);
-        service.console.operator.wish();
+        service.console.operator.take_pending();
         service.console.configure(Config::from_words(&words).unwrap());
         service.send();
         let state = [0; MACHINE_STATE_WORDS];

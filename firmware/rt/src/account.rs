@@ -18,7 +18,7 @@ use std::fmt::Write as _;
 pub enum Cause {
     /// The loop was woken late.
     Wake,
-    /// The whole machine slept.
+    /// The computer was suspended.
     Suspended,
     /// The thread was preempted during a tick.
     Preempted,
@@ -52,7 +52,7 @@ impl Cause {
     pub fn name(self) -> &'static str {
         match self {
             Self::Wake => "woken late",
-            Self::Suspended => "machine suspended",
+            Self::Suspended => "computer suspended",
             Self::Preempted => "preempted",
             Self::PageFault => "page fault",
             Self::Input => "gauges slow",
@@ -150,7 +150,7 @@ impl Account {
     }
 
     /// The loop has reached the tick planned at `planned` (ns) at the time `woken`. Enters the ticks whose periods have
-    /// passed as skipped, and returns their number. `suspended`: the machine slept since the last tick.
+    /// passed as skipped, and returns their number. `suspended`: the computer was suspended since the last tick.
     pub fn arrive(&mut self, planned: u64, woken: u64, suspended: bool) -> u64 {
         let over = woken.saturating_sub(planned) / self.period;
         if over > 0 {

@@ -2,13 +2,13 @@
 //! `specgen doctor`.
 //!
 //! ```text
-//! clock        monotonic time, absolute sleeps, what happened to a thread in between
-//! scheduling   SCHED_FIFO, locked memory, processor, C-states: asked for, or what is missing in words
+//! clock        monotonic time, absolute sleeps, a thread's preemptions and page faults
+//! scheduling   SCHED_FIFO, locked memory, processor, C-states; missing privileges as text
 //! account      every planned tick is on time, late or skipped, and why
 //! histogram    times in fixed memory
-//! allocation   an allocator that notices when a real-time thread uses it
+//! allocation   an allocator that counts its use by a real-time thread
 //! exchange     shared memory between a controller and the machine that it moves
-//! signals      those that are no reason to end
+//! signals      SIGINT and SIGTERM as flags
 //! ```
 //! Linux only. System calls are in `clock`, `scheduling`, `exchange`, `allocation` and `signals`, the only modules with
 //! unsafe code.

@@ -10,7 +10,7 @@
 //! The inverse follows the same staircase by displacement, then solves one branch ([`Grid::rise`], [`Grid::fall`]).
 //! Within a cell of the table a branch is a straight line ([`Line`]), which inverse and forward model share.
 //!
-//! The table sets the number of stored extrema ([`Grid::capacity`]): all that fit, or fewer at run time.
+//! The table sets the number of stored extrema ([`Grid::capacity`]): the memory's size, or fewer.
 //!
 //! # Example
 //!
@@ -267,7 +267,7 @@ impl<T: Real, const CAP: usize> ReversalMemory<T, CAP> {
         self.apply(table, drive);
     }
 
-    /// Applies a drive that usually lies on the branch; true.
+    /// Applies a drive that usually lies on the branch. Always returns true.
     #[inline(always)]
     fn take_or_apply<const RISING: bool, G: Grid<T>>(&mut self, table: &G, branch: &Branch<T>, drive: T) -> bool {
         if !self.take::<RISING, G>(table, branch, drive) {

@@ -13,7 +13,7 @@ use crate::time::{MICROSECOND, Time};
 
 /// Most bytes that wait for the board: a host that sends more is held up.
 const WAITING: usize = 4096;
-/// A host asks every 20 ms (`specgen_operate::ALIVE`): half of what a board may take for a loss (100 ms).
+/// A host asks every 20 ms (`specgen_operate::POLL_INTERVAL`): half of what a board may take for a loss (100 ms).
 const SILENCE: Time = 50_000 * MICROSECOND;
 
 pub struct Line {

@@ -13,7 +13,7 @@ use super::path_roles::InputFile;
 pub struct Arguments {
     /// The spec file.
     spec: InputFile,
-    /// Print all findings below the verdict.
+    /// Also print the properties of the controller: assumed values, margins, reach, limits of the wiring check.
     #[arg(long)]
     details: bool,
     #[command(flatten)]

@@ -17,8 +17,8 @@ Examples:
   specgen identify record.csv --drive 0:100
   specgen flash platform.toml         # (board) build, check, write to the board
 
-docs/guide.md leads from measurements to running firmware. Every command has its
-own examples: `specgen check --help`. (minutes): takes several minutes. (board):
+docs/README.md lists the tutorials. Every command has its own examples:
+`specgen check --help`. (minutes): takes several minutes. (board):
 needs a board, a second program, or an idle computer.
 
 Exit codes: 0 good; 1 spec, record or budget refused, or an unreadable input;
@@ -116,7 +116,7 @@ Examples:
       measure the response of the running loop
   specgen learn learning.toml --response response.json
       learn with that response, independent of the spec's stiffness
-  specgen learn learning.toml --trajectory case-1 --socket link --machine stage-7  # (board)
+  specgen learn learning.toml --socket link --machine stage-7  # (board)
       on a machine, which is armed first and ramped down afterwards";
 
 pub const ROBUST: &str = "\
@@ -178,10 +178,13 @@ Commands: status, arm, run, hold, ramp-down, acknowledge, none,
   can-i-go AXIS=QUANTITY… [speed=QUANTITY], mark|goto NAME,
   play TRAJECTORY [correction=FILE machine=NAME],
   frame [none | work|tool AXIS=QUANTITY…], mode p|f|pf, gains [NAME=VALUE…],
-  wait PHASE|arrived|SECONDS [TIMEOUT], config, config write SPEC,
+  trigger LINE NAME=VALUE…, wait PHASE|arrived|SECONDS [TIMEOUT], config,
+  config [code_min=CODE] [code_max=CODE], config write SPEC,
   record arm [AFTER] | trigger | stop | look | download FILE, wave FILE | stop,
   on-edge [drop | move … | jog … | goto … | play … | wave FILE],
   watch [EVERY [SECONDS [FILE]]], stop (ends the program at a socket)
+docs/operate.md explains them. `none` ends a request, so that it can be given
+again; `acknowledge` clears a fault; `can-i-go` names the limit that prevents it.
 
 The link ends with this command; the machine then holds after 0.1 s. Ctrl-C
 ramps down first.";

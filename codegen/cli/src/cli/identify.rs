@@ -31,7 +31,7 @@ pub struct Arguments {
 
 #[derive(Subcommand, Debug)]
 enum Kind {
-    /// Linear relation Y = ρX + δ of records at several frequencies, λ, and the weights that are stable over λ.
+    /// Linear relation Y = ρX + δ of records at several frequencies, λ (ρ over that of the lowest), and the weights stable over λ.
     Linear(LinearArguments),
     /// Frequency response from a swept sine, multisine or noise: resonance, damping, lag, dead time.
     Response(ResponseArguments),
@@ -50,7 +50,7 @@ enum Kind {
 /// Arguments of `identify RECORD`.
 #[derive(Args, Debug)]
 struct EverettArguments {
-    /// Reversal-curve record: CSV with columns time_s, drive_V, displacement_um.
+    /// Reversal-curve record (CSV, MATLAB, HDF5, TDMS) with columns time_s, drive_V, displacement_um.
     #[arg(required = true)]
     record: Option<InputFile>,
     /// Voltage range of the table, V, such as 0:100 or -90:90.

@@ -27,7 +27,7 @@ pub struct Arguments {
 enum Like {
     /// Six gauges measure the platform's pose; feedback and feed-forward in task space.
     Reference,
-    /// Each leg has its own gauge; feed-forward only.
+    /// Each leg has its own gauge; feed-forward and run-to-run adaptation.
     Legs,
 }
 

@@ -8,7 +8,7 @@ use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
 use rustix::process::Signal;
-use specgen::operate::{Place, Session, SocketLine};
+use specgen::operate::{MeasuredPose, Session, SocketLine};
 use specgen_link::Request;
 use specgen_link::client::Timeout;
 
@@ -199,7 +199,7 @@ fn a_program_of_others(bench: &Bench, port: u16) {
     print!("{}", String::from_utf8_lossy(&output.stdout));
 }
 
-fn identification(client: &mut Client, read_place: &mut impl FnMut() -> Place) {
+fn identification(client: &mut Client, read_place: &mut impl FnMut() -> MeasuredPose) {
     let name = client.ask("*IDN?");
     assert!(name.starts_with("specgen,HEXAPOD reference,") && name.split(',').count() == 4, "{name}");
     assert_eq!([client.ask("CSV?"), client.error()], ["2.0", "0"]);
@@ -222,7 +222,7 @@ fn identification(client: &mut Client, read_place: &mut impl FnMut() -> Place) {
     assert_eq!(read_place().phase, RUNNING);
 }
 
-fn a_refused_move_moves_nothing(client: &mut Client, read_place: &mut impl FnMut() -> Place) {
+fn a_refused_move_moves_nothing(client: &mut Client, read_place: &mut impl FnMut() -> MeasuredPose) {
     let mut worst: f64 = 0.0;
     let moves = length(6, 100_u32);
     for count in 0..moves {
@@ -292,7 +292,7 @@ fn a_refused_move_moves_nothing(client: &mut Client, read_place: &mut impl FnMut
 }
 
 /// Latency from a command to the first tick whose set-point follows it, as seen by another host.
-fn latency(client: &mut Client, read_place: &mut impl FnMut() -> Place) {
+fn latency(client: &mut Client, read_place: &mut impl FnMut() -> MeasuredPose) {
     let times = length(3, 50);
     let mut times: Vec<f64> = (0..times)
         .map(|count| {
@@ -365,7 +365,7 @@ fn other_clients_may_read_and_stop(
     (bridge, link): (&Bridge, &Path),
     first: &mut Client,
     second: &mut Client,
-    read_place: &mut impl FnMut() -> Place,
+    read_place: &mut impl FnMut() -> MeasuredPose,
 ) {
     assert_eq!([second.order("MOV X 1"), second.order("SVO X 0")], ["89", "89"]);
     // A host that only queries is not missed when it leaves, and prints no warning.
@@ -405,7 +405,7 @@ fn other_clients_may_read_and_stop(
 fn control_is_free_once_a_client_leaves(
     mut first: Client,
     second: &mut Client,
-    read_place: &mut impl FnMut() -> Place,
+    read_place: &mut impl FnMut() -> MeasuredPose,
 ) {
     assert_eq!(first.order("MOV X -20"), "0");
     wait_for("the motion", || second.value("POS? X") < 0.0);

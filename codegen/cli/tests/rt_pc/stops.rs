@@ -11,7 +11,7 @@ use std::time::{Duration, Instant};
 
 use rustix::process::Signal;
 use serde_json::json;
-use specgen::operate::{Place, Session, SocketLine};
+use specgen::operate::{MeasuredPose, Session, SocketLine};
 use specgen_link::client::{Client, Port, Timeout};
 use specgen_link::{Bytes, CostUnit, Device, Endpoint, Identity, Refusal, Reply, Request};
 
@@ -43,19 +43,20 @@ impl Observer {
         Self(Session::open(SocketLine::open(link).unwrap(), Timeout::SOCKET, None).unwrap())
     }
 
-    fn now(&mut self) -> Place {
+    fn now(&mut self) -> MeasuredPose {
         self.0.place().unwrap().unwrap()
     }
 
-    fn wait(&mut self, what: &str, there: impl Fn(&Place) -> bool) {
+    fn wait(&mut self, what: &str, there: impl Fn(&MeasuredPose) -> bool) {
         wait_for(what, || there(&self.now()));
     }
 
     /// Asserts that after a stop there is at most a stopping ramp, and then no motion.
     #[track_caller]
     fn assert_at_rest(&mut self, what: &str) {
-        let way =
-            |a: &Place, b: &Place| a.target.iter().zip(&b.target).fold(0.0, |way: f64, (a, b)| way.max((a - b).abs()));
+        let way = |a: &MeasuredPose, b: &MeasuredPose| {
+            a.target.iter().zip(&b.target).fold(0.0, |way: f64, (a, b)| way.max((a - b).abs()))
+        };
         let (mut start, begun) = (Instant::now(), self.now());
         let mut rest = begun;
         while start.elapsed() < RAMP {

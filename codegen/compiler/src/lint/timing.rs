@@ -3,8 +3,8 @@
 use super::{Facts, Findings, figure};
 
 lints! {
-    rules: times_that_do_nothing, lead_of_the_lag, transfer, velocity_filter, ticks_against_modes, gauges_in_time,
-        modes_seen_as_others;
+    rules: times_too_short, lead_too_long, transfer, velocity_filter, ticks_against_modes, gauges_in_time,
+        aliased_modes;
 
     /// # W0830: a time too short to have an effect
     ///
@@ -230,7 +230,7 @@ const FEWEST_TICKS: f64 = 4.0;
 const MOST_TICKS: f64 = 3000.0;
 
 /// Checks for times that are too short to have an effect.
-fn times_that_do_nothing(facts: &Facts, found: &mut Findings) {
+fn times_too_short(facts: &Facts, found: &mut Findings) {
     let model = facts.model;
     let tick = model.timing.period;
     let lead = model.task_space.as_ref().and_then(|task| task.lead).unwrap_or(0.0);
@@ -261,7 +261,7 @@ fn times_that_do_nothing(facts: &Facts, found: &mut Findings) {
 }
 
 /// Checks that leads do not exceed the delays that they compensate.
-fn lead_of_the_lag(facts: &Facts, found: &mut Findings) {
+fn lead_too_long(facts: &Facts, found: &mut Findings) {
     let model = facts.model;
     let lag = model.amplifier.lag + model.timing.period;
     // The legs' own resonance delays them by a part of its period.
@@ -382,7 +382,7 @@ fn gauges_in_time(facts: &Facts, found: &mut Findings) {
 }
 
 /// Checks for aliased modes that the gauges do not filter out.
-fn modes_seen_as_others(facts: &Facts, found: &mut Findings) {
+fn aliased_modes(facts: &Facts, found: &mut Findings) {
     let (lag, tick) = (facts.model.sensor.lag, facts.model.timing.period);
     let Some(modes) = facts.legs.as_ref().and_then(|legs| legs.modes) else { return };
     let share = |mode: f64| 1.0 / libm::hypot(1.0, core::f64::consts::TAU * mode * lag);

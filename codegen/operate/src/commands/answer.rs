@@ -3,8 +3,7 @@
 use std::fmt::Write as _;
 use std::time::Duration;
 
-use crate::session::FRESH;
-use serde::ser::SerializeMap;
+use crate::session::MAX_AGE;
 use serde::{Serialize, Serializer};
 use serde_json::Value;
 
@@ -50,7 +49,7 @@ pub struct MachineStatus {
     pub tick: u64,
     pub phase: u8,
     pub cause: u8,
-    pub stands: String,
+    pub state: String,
     pub amplifiers_on: bool,
     pub status: u32,
     pub status_in_words: String,
@@ -70,14 +69,16 @@ impl Outcome for MachineStatus {
         let on = if self.amplifiers_on { "on" } else { "off" };
         let age = match self.age.map(Duration::from_secs_f64) {
             None => "  no tick yet: these are initial values\n".to_owned(),
-            Some(age) if age >= FRESH => format!("  the machine is not ticking: this is its state {} ago\n", ago(age)),
+            Some(age) if age >= MAX_AGE => {
+                format!("  the machine is not ticking: this is its state {} ago\n", ago(age))
+            }
             Some(_) => String::new(),
         };
         format!(
             "tick {}, {:.4} s: {}, amplifiers {on}; status {:#x}: {}\n{age}  {} late ticks, {} damaged frames\n",
             self.tick,
             self.tick as f64 * self.period,
-            self.stands,
+            self.state,
             self.status,
             if self.status_in_words.is_empty() { "-" } else { &self.status_in_words },
             self.late,
@@ -103,11 +104,7 @@ pub struct Settings(pub Vec<(String, Value)>);
 
 impl Serialize for Settings {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let mut map = serializer.serialize_map(Some(self.0.len()))?;
-        for (name, value) in &self.0 {
-            map.serialize_entry(name, value)?;
-        }
-        map.end()
+        serializer.collect_map(self.0.iter().map(|(name, value)| (name, value)))
     }
 }
 

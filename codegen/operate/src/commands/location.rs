@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 use std::time::Duration;
 
 use crate::place::AXES;
-use crate::session::{FRESH, GAUGES, Place};
+use crate::session::{GAUGES, MAX_AGE, MeasuredPose};
 use serde::Serialize;
 use specgen_link::Status;
 use specgen_runtime::setpoint::BUSY;
@@ -50,16 +50,16 @@ pub fn ago(age: Duration) -> String {
 
 /// Whether the last tick is recent.
 pub fn ticks(status: &Status) -> bool {
-    status.age.is_some_and(|age| Duration::from_micros(age) < FRESH)
+    status.age.is_some_and(|age| Duration::from_micros(age) < MAX_AGE)
 }
 
 /// Why the pose is not measured; none if it is.
-fn why(place: &Place, status: &Status) -> Option<String> {
+fn why(place: &MeasuredPose, status: &Status) -> Option<String> {
     let bad = (place.status & GAUGES) >> GAUGES.trailing_zeros();
     let all = GAUGES >> GAUGES.trailing_zeros();
     match status.age.map(Duration::from_micros) {
         None => Some("no tick yet".to_owned()),
-        Some(age) if age >= FRESH => Some(format!("no tick for {}", ago(age))),
+        Some(age) if age >= MAX_AGE => Some(format!("no tick for {}", ago(age))),
         Some(_) if bad == all => Some("the gauges are not read".to_owned()),
         Some(_) if bad != 0 => {
             let numbers: Vec<String> =
@@ -74,7 +74,7 @@ fn why(place: &Place, status: &Status) -> Option<String> {
 
 impl Location {
     /// From a place and the status read with it; `seen` converts poses to the session's frame.
-    pub fn of(place: &Place, status: &Status, seen: impl Fn(&[f64; 6]) -> [f64; 6]) -> Self {
+    pub fn of(place: &MeasuredPose, status: &Status, seen: impl Fn(&[f64; 6]) -> [f64; 6]) -> Self {
         let millionths = |values: [f64; 6]| values.map(|value| value * 1e6);
         let (pose, target) = (millionths(seen(&place.pose)), millionths(seen(&place.target)));
         let why = why(place, status);
@@ -147,7 +147,7 @@ mod tests {
     }
 
     fn location(bits: u32, measured: Option<u64>, age: Option<u64>) -> Location {
-        let place = Place {
+        let place = MeasuredPose {
             tick: 9,
             phase: 3,
             status: bits,

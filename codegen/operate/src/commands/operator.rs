@@ -17,7 +17,7 @@ use super::health::StatusReport;
 use super::pose::{ZERO, in_words};
 use crate::command::{Command, WaitCondition};
 use crate::frame::Frame;
-use crate::session::{ALIVE, Session};
+use crate::session::{POLL_INTERVAL, Session};
 use specgen_compiler::compile;
 use specgen_language::files;
 use specgen_language::model::Model;
@@ -111,7 +111,7 @@ impl<P: Port> Operator<P> {
             tick: status.tick,
             phase: status.phase,
             cause: status.cause,
-            stands: self.state(),
+            state: self.state(),
             amplifiers_on: status.amplifier_on,
             status: status.status,
             status_in_words: host_sim::word::status_words(status.status).replace('+', ", "),
@@ -204,7 +204,7 @@ impl<P: Port> Operator<P> {
                 self.playable(name, correction.as_ref()).map(|_| ()).map_err(nonsense)
             }
             Command::Gains(gains) => self.gains_of(gains).map(|_| ()).map_err(nonsense),
-            Command::Trigger { line, settings } => self.places_of(*line, settings).map(|_| ()).map_err(nonsense),
+            Command::Trigger { line, settings } => self.trigger_words(*line, settings).map(|_| ()).map_err(nonsense),
             Command::Move { .. }
             | Command::Frame(_)
             | Command::Where
@@ -306,6 +306,10 @@ impl<P: Port> Operator<P> {
                 self.session.command(words).map_err(waving)?;
             }
             Command::WriteConfig(spec) => self.write_config(spec)?,
+            Command::CodeLimits(limits) => {
+                let words = self.changed(limits)?;
+                self.configure(&words, |name| format!("`{name}`: expected code_min ≤ code_max, within the spec's"))?;
+            }
             Command::Trigger { line, settings } => self.set_trigger(*line, settings)?,
             Command::Wave(path) => self.wave(path, false)?,
             Command::StopWave => self.session.stop_wave()?,
@@ -482,6 +486,22 @@ impl<P: Port> Operator<P> {
         self.configure(words, |name| format!("the device refused `{name}` of {of}: out of its range"))
     }
 
+    /// Index of a setting.
+    pub(super) fn setting(&self, name: &str) -> Option<usize> {
+        self.session.description().config_names.iter().position(|known| known == name)
+    }
+
+    /// The settings in force, with these words changed.
+    pub(super) fn changed(&mut self, words: &[(String, u64)]) -> Result<Vec<u64>, SessionError> {
+        let mut settings = self.session.config()?;
+        for (name, word) in words {
+            if let Some(slot) = self.setting(name).and_then(|place| settings.get_mut(place)) {
+                *slot = *word;
+            }
+        }
+        Ok(settings)
+    }
+
     /// Sends all settings. `refused` is the message about a setting of this name that the device refuses.
     pub(super) fn configure(&mut self, words: &[u64], refused: impl Fn(&str) -> String) -> Result<(), SessionError> {
         self.in_control = true;
@@ -507,7 +527,7 @@ impl<P: Port> Operator<P> {
             if complete {
                 return Ok(whole);
             }
-            if looked.elapsed() >= ALIVE {
+            if looked.elapsed() >= POLL_INTERVAL {
                 self.look()?;
                 looked = Instant::now();
             }

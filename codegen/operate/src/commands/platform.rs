@@ -6,7 +6,7 @@ use crate::command::{Command, FrameRequest, ModeRequest};
 use crate::frame::Frame;
 use crate::motion::{self, Motion};
 use crate::place::{self, AXES, AxisValues, Pace, amount, meant};
-use crate::session::Place;
+use crate::session::MeasuredPose;
 use host_sim::word::status_words;
 use serde::Serialize;
 use specgen_compiler::compile;
@@ -126,7 +126,7 @@ impl<P: Port> Operator<P> {
         self.session.motion().ok_or_else(|| "the device controls six legs and has no pose".to_owned())
     }
 
-    pub(super) fn place(&mut self) -> Result<Place, SessionError> {
+    pub(super) fn place(&mut self) -> Result<MeasuredPose, SessionError> {
         let place = self.session.place()?;
         place.ok_or_else(|| SessionError::Refused("the device controls six legs and has no pose".to_owned()))
     }
@@ -163,7 +163,7 @@ impl<P: Port> Operator<P> {
     }
 
     /// Location in the session's frame.
-    pub(super) fn located(&self, place: &Place) -> Location {
+    pub(super) fn located(&self, place: &MeasuredPose) -> Location {
         Location::of(place, self.session.status(), |user| self.seen(user))
     }
 
@@ -182,28 +182,28 @@ impl<P: Port> Operator<P> {
         })
     }
 
-    /// Indices of these gains in the settings, and their values.
-    pub(super) fn gains_of(&self, gains: &[(String, f64)]) -> Result<Vec<(usize, f64)>, String> {
+    /// These gains by the names of their settings, as words.
+    pub(super) fn gains_of(&self, gains: &[(String, f64)]) -> Result<Vec<(String, u64)>, String> {
         self.motion()?;
         if !gains.is_empty() && self.model.is_none() {
             return Err("gains are checked for stability with the spec before they are sent: name the spec".to_owned());
         }
-        let names = &self.session.description().config_names;
-        let mut places = Vec::new();
+        let description = self.session.description();
+        let mut words = Vec::new();
         for (name, value) in gains {
-            let found = names.iter().enumerate().filter(|(_, known)| {
+            let found = description.config_names.iter().filter(|known| {
                 let whole = known.split('[').next() == Some(name.as_str());
-                is_gain(known) && (*known == name || whole)
+                is_gain(known) && (**known == *name || whole)
             });
-            let before = places.len();
-            places.extend(found.map(|(place, _)| (place, *value)));
-            if places.len() == before {
+            let before = words.len();
+            words.extend(found.map(|name| (name.clone(), description.scalar.encode(*value))));
+            if words.len() == before {
                 return Err(format!(
                     "there is no gain `{name}`; expected kp, ki, kv or, for P and P/F with Invhys, position_kp, position_ki, position_kv, each for all axes or for one, as in ki[2]"
                 ));
             }
         }
-        Ok(places)
+        Ok(words)
     }
 
     /// Executes a command that needs a platform.
@@ -283,8 +283,7 @@ impl<P: Port> Operator<P> {
     }
 
     fn word_of(&self, words: &[u64], name: &str) -> Option<u64> {
-        let place = self.session.description().config_names.iter().position(|known| known == name)?;
-        words.get(place).copied()
+        words.get(self.setting(name)?).copied()
     }
 
     /// Six numbers of the settings.
@@ -309,26 +308,17 @@ impl<P: Port> Operator<P> {
 
     /// Sets the mode. It needs no stability check: the compiler accepts a spec only if all modes are stable.
     fn set_mode(&mut self, wanted: &ModeRequest) -> Result<(), SessionError> {
-        let mut words = self.session.config()?;
+        let words = self.session.config()?;
         let now = self.word_of(&words, "mode").unwrap_or_default();
         let mode = wanted.word(now).map_err(SessionError::Refused)?;
-        let place = self.session.description().config_names.iter().position(|name| name == "mode");
-        if let Some(slot) = place.and_then(|place| words.get_mut(place)) {
-            *slot = mode;
-        }
+        let words = self.changed(&[("mode".to_owned(), mode)])?;
         self.configure(&words, beyond_range)
     }
 
     /// Checks the stability margins of the gains, then sends them. Returns λ up to which every mode is stable.
     fn set_gains(&mut self, gains: &[(String, f64)]) -> Result<Option<f64>, SessionError> {
-        let places = self.gains_of(gains).map_err(SessionError::Refused)?;
-        let mut words = self.session.config()?;
-        let scalar = self.session.description().scalar;
-        for (place, value) in places {
-            if let Some(slot) = words.get_mut(place) {
-                *slot = scalar.encode(value);
-            }
-        }
+        let words = self.gains_of(gains).map_err(SessionError::Refused)?;
+        let words = self.changed(&words)?;
         let of = |prefix: &str| {
             let [proportional, integral, derivative] = GAINS.map(|name| self.six(&words, &format!("{prefix}{name}")));
             Gains { proportional, integral, derivative }

@@ -1,7 +1,6 @@
 //! Digital lines: trigger settings of outputs, and commands that wait for an edge of the input.
 
 use crate::command::Command;
-use host_sim::word::WordKind;
 use serde::Serialize;
 use specgen_link::client::{ClientError, Port};
 use specgen_link::{EdgeStatus, Refusal};
@@ -16,7 +15,7 @@ use specgen_language::outcome::Outcome;
 pub struct EdgeState {
     /// Number of the stage of the last command.
     stage: u8,
-    stands: &'static str,
+    state: &'static str,
     /// Rising edges since power-up.
     edges: u32,
     /// Tick of the edge at which that command started or was refused.
@@ -30,19 +29,18 @@ impl Outcome for EdgeState {
             count => format!("{count} edges"),
         };
         let of_tick = self.tick.map(|tick| format!(" of tick {tick}")).unwrap_or_default();
-        format!("{}{of_tick}; {edges} of the input line so far\n", self.stands)
+        format!("{}{of_tick}; {edges} of the input line so far\n", self.state)
     }
 }
 
 impl<P: Port> Operator<P> {
-    /// Indices and words of a trigger's settings.
-    pub(super) fn places_of(&self, line: usize, settings: &[(String, f64)]) -> Result<Vec<(usize, u64)>, String> {
+    /// Names and words of a trigger's settings.
+    pub(super) fn trigger_words(&self, line: usize, settings: &[(String, f64)]) -> Result<Vec<(String, u64)>, String> {
         let description = self.session.description();
-        let place = |name: &str| {
-            let wanted = format!("trigger_{name}[{line}]");
-            let known = description.config_names.iter().position(|known| *known == wanted);
+        let full = |name: &str| {
             let suffix = format!("[{line}]");
-            known.map(|place| (place, WordKind::of(&wanted))).ok_or_else(|| {
+            let full = format!("trigger_{name}{suffix}");
+            self.setting(&full).map(|_| full).ok_or_else(|| {
                 let names = description.config_names.iter();
                 let names = names.filter_map(|name| name.strip_prefix("trigger_")?.strip_suffix(&suffix));
                 match names.collect::<Vec<_>>().join(", ") {
@@ -54,25 +52,17 @@ impl<P: Port> Operator<P> {
             })
         };
         let word = |(name, value): &(String, f64)| {
-            let (place, kind) = place(name)?;
-            match kind {
-                WordKind::Real => Ok((place, description.scalar.encode(*value))),
-                WordKind::Integer if value.fract() == 0.0 && *value >= 0.0 => Ok((place, *value as u64)),
-                WordKind::Integer => Err(format!("`{name}`: expected a whole number, found {value}")),
-            }
+            let name = full(name)?;
+            let word = description.encode(&name, *value).map_err(|error| error.to_string())?;
+            Ok((name, word))
         };
         settings.iter().map(word).collect()
     }
 
     /// Changes settings of a trigger. They take effect at the next tick, which restarts the line.
     pub(super) fn set_trigger(&mut self, line: usize, settings: &[(String, f64)]) -> Result<(), SessionError> {
-        let places = self.places_of(line, settings).map_err(SessionError::Refused)?;
-        let mut words = self.session.config()?;
-        for (place, word) in places {
-            if let Some(slot) = words.get_mut(place) {
-                *slot = word;
-            }
-        }
+        let words = self.trigger_words(line, settings).map_err(SessionError::Refused)?;
+        let words = self.changed(&words)?;
         let refused =
             |name: &str| format!("`{name}` is out of its range (docs/triggers.md); the settings are unchanged");
         self.configure(&words, refused)
@@ -110,6 +100,6 @@ impl<P: Port> Operator<P> {
         })?;
         let known = Stage::from_word(u64::from(stage));
         let settled = matches!(known, Some(Stage::Begun | Stage::Refused));
-        Ok(EdgeState { stage, stands: known.map_or("?", Stage::name), edges, tick: settled.then_some(tick) })
+        Ok(EdgeState { stage, state: known.map_or("?", Stage::name), edges, tick: settled.then_some(tick) })
     }
 }

@@ -10,12 +10,12 @@ use specgen_runtime::supervisor::{Phase, Request};
 use super::code::Code;
 use crate::frame::Frame;
 use crate::motion::{self, Motion};
-use crate::session::{Place, Session};
+use crate::session::{MeasuredPose, Session};
 
 /// Ticks after which a place shows the effect of a command.
 const SEEN: u64 = 10;
 /// Largest age of a place for an answer.
-const FRESH: Duration = Duration::from_micros(500);
+const MAX_AGE: Duration = Duration::from_micros(500);
 /// How long to wait for a machine that is not ticking.
 const SILENT: Duration = Duration::from_millis(100);
 /// Timeout of starting the machine.
@@ -30,7 +30,7 @@ const POLL: Duration = Duration::from_secs(1);
 pub struct Stage<P> {
     session: Session<P>,
     motion: Motion,
-    place: Place,
+    place: MeasuredPose,
     seen: Instant,
     /// Time of the last status request.
     polled: Instant,
@@ -175,7 +175,7 @@ impl<P: Port> Stage<P> {
 
     /// Updates the place, unless it is recent.
     pub(super) fn refresh(&mut self) -> Result<(), ClientError> {
-        if self.seen.elapsed() < FRESH && self.is_answered() {
+        if self.seen.elapsed() < MAX_AGE && self.is_answered() {
             return Ok(());
         }
         self.look()

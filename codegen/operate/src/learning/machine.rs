@@ -11,7 +11,7 @@ use specgen_studies::learning::{LearnError, Motion, PassObservation, Plan, Repea
 
 use crate::command::{Command, WaitCondition};
 use crate::commands::{Operator, SessionError};
-use crate::session::ALIVE;
+use crate::session::POLL_INTERVAL;
 use specgen_language::outcome::Failure;
 use specgen_language::ui::Ui;
 
@@ -75,7 +75,7 @@ impl<P: Port> LinkedMachine<'_, P> {
                         "the machine does not arm; `status` in `specgen operate` shows why".to_owned(),
                     ));
                 }
-                self.operator.execute(&wait(WaitCondition::Passed(ALIVE)), self.ui)?;
+                self.operator.execute(&wait(WaitCondition::Passed(POLL_INTERVAL)), self.ui)?;
             }
             self.operator.execute(&Command::Ask(Request::Run), self.ui)?;
             self.operator.execute(&wait(WaitCondition::Phase(Phase::Running)), self.ui)?;

@@ -9,7 +9,7 @@ use specgen_runtime::supervisor::Request;
 
 use crate::command::Command;
 use crate::commands::{Operator, SessionError};
-use crate::session::ALIVE;
+use crate::session::POLL_INTERVAL;
 
 /// Ticks without a request before an edge-triggered one.
 const BEFORE: u64 = 10;
@@ -31,7 +31,7 @@ pub(super) fn send_edge<P: Port>(operator: &mut Operator<P>, request: Request) -
     operator.session.supervise(Request::None)?;
     let (sent, since) = (operator.status().tick, Instant::now());
     // A machine that is not ticking also gets the request.
-    while operator.status().tick < sent + BEFORE && since.elapsed() < ALIVE {
+    while operator.status().tick < sent + BEFORE && since.elapsed() < POLL_INTERVAL {
         std::thread::sleep(Duration::from_millis(1));
         operator.look()?;
     }

@@ -5,6 +5,8 @@
 //! P = G (I + s D + s² W)⁻¹ R S       R: lags and sampling of P₀;  S = A⁻¹ diag(λ h) A over legs;  G = B⁻¹ diag(h) B over gauges
 //! h = H of a leg mode, 1 + a r² H of a gauge mount or the frame        H = 1/(1 − r² + 2jζr),  r = f/f_n
 //! ```
+//! s = 2πjf. In modal coordinates of the model: W is mass, D (diagonal, 2ζ/ω) damping over stiffness; A, B: displacements of legs and
+//! readings of gauges.
 //! W, D, the gains λ of the legs, a dead time and a lag are fitted, too: stiffness, mass and gain of a machine are not those of its spec.
 //! A mode is sought where what this fit leaves has the shape of r² H in the direction of one leg, of one gauge, or of all.
 
@@ -21,26 +23,27 @@ use fit::{Domain, Fit, Problem, RATIO, Resonance, sum};
 mod fit;
 
 /// Largest number of modes.
-const MOST: usize = 6;
+const MAX_MODES: usize = 6;
 /// Least fall of χ² by a mode, in units of χ² per degree of freedom.
-const SHOWN: f64 = 60.0;
+const MIN_CHI2_DROP: f64 = 60.0;
 /// Largest standard error of a mode's figures relative to their values.
 const UNCERTAIN: f64 = 1.0 / 3.0;
 /// A mode of less participation disturbs no loop, and may be a trace of hysteresis.
 const LEAST_PART: f64 = 0.03;
-/// Steps of a fit, and of those from which the best is chosen.
+/// Steps of a fit.
 const STEPS: usize = 30;
+/// Steps of the fits from which the best is chosen.
 const FIRST_STEPS: usize = 6;
 /// Fall of χ² that one more parameter must bring, in units of χ² per degree of freedom.
 const PER_PARAMETER: f64 = 5.0;
 /// Damping ratios sought.
 const RATIOS: [f64; 6] = [0.005, 0.01, 0.02, 0.04, 0.08, 0.15];
 /// Half of the band around a sought mode: in damping ratios, and the least, both relative to its frequency.
-const ABOUT: [f64; 2] = [6.0, 0.04];
+const HALF_BAND: [f64; 2] = [6.0, 0.04];
 /// Number of places for which a mode is fitted.
 const PLACES: usize = 3;
 /// Places are near if the fall of χ² of P by a mode there is at least this part of the largest.
-const NEAR: f64 = 0.5;
+const NEAR_BEST: f64 = 0.5;
 /// The mode that a record must be able to show: damping ratios; participation of a gauge and, of all gauges, the frame.
 const LEAST_SHOWN: [f64; 2] = [0.01, 0.05];
 const PARTICIPATIONS: [f64; 2] = [0.5, 0.1];
@@ -53,7 +56,7 @@ type Direction = Vec<(f64, Complex, f64)>;
 /// Where a structural mode acts. Legs and gauges are numbered from 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Place {
+pub enum Location {
     /// In series with one leg.
     Leg(usize),
     /// In series with every leg.
@@ -74,7 +77,7 @@ pub struct StructuralMode {
     /// a, 1 for a leg.
     pub participation: Parameter,
     /// Where it acts.
-    pub place: Place,
+    pub place: Location,
 }
 
 /// What a response shows of the structure.
@@ -90,7 +93,7 @@ pub struct Structure {
     pub misfit: f64,
 }
 
-impl Place {
+impl Location {
     /// Whether a mode there acts on readings; then its participation is free.
     fn on_gauges(self) -> bool {
         matches!(self, Self::Gauge(_) | Self::Gauges)
@@ -123,11 +126,11 @@ impl StructuralMode {
     /// Kind, number of leg or gauge, and frequency (Hz) in a spec, where only the frame has a negative participation.
     fn written(&self) -> (StructuralKind, Option<usize>, f64) {
         let (kind, number) = match self.place {
-            Place::Leg(leg) => (StructuralKind::Leg, Some(leg)),
-            Place::Legs => (StructuralKind::Leg, None),
+            Location::Leg(leg) => (StructuralKind::Leg, Some(leg)),
+            Location::Legs => (StructuralKind::Leg, None),
             _ if self.participation.value < 0.0 => (StructuralKind::Frame, None),
-            Place::Gauge(gauge) => (StructuralKind::Gauge, Some(gauge)),
-            Place::Gauges => (StructuralKind::Gauge, None),
+            Location::Gauge(gauge) => (StructuralKind::Gauge, Some(gauge)),
+            Location::Gauges => (StructuralKind::Gauge, None),
         };
         (kind, number, libm::round(10.0 * self.frequency.value) / 10.0)
     }
@@ -139,7 +142,7 @@ impl StructuralMode {
         let at = number.map_or(kind.word().to_owned(), |number| format!("{} {}", kind.word(), number + 1));
         let seen = match place {
             // A spec has no reaction in one gauge alone. In all gauges it disturbs the loop more.
-            Place::Gauge(gauge) if number.is_none() => format!("  # in gauge {}", gauge + 1),
+            Location::Gauge(gauge) if number.is_none() => format!("  # in gauge {}", gauge + 1),
             _ => String::new(),
         };
         let mut lines = format!(
@@ -167,9 +170,9 @@ impl Learnable {
         let problem = Problem::new(self, compiled, bins)?;
         let mut fit = problem.fitted(&problem.start, Vec::new(), STEPS, Domain::Closed);
         let (mut modes, mut unresolved) = (Vec::new(), None);
-        while fit.modes.len() < MOST {
+        while fit.modes.len() < MAX_MODES {
             let Some(best) = problem.with_next_mode(&fit) else { break };
-            if fit.cost - best.cost < SHOWN * problem.misfit(&best) {
+            if fit.cost - best.cost < MIN_CHI2_DROP * problem.misfit(&best) {
                 break;
             }
             let estimates = problem.estimates(&best)?;
@@ -203,7 +206,7 @@ impl Problem {
         let sought: Vec<Fit> = self.candidates(&fit).into_iter().map(with).collect();
         let fall = |next: &Fit| fit.cost - next.cost;
         let most = sought.iter().map(fall).max_by(f64::total_cmp)?;
-        let shown = |next: &Fit| fall(next) >= NEAR * most && fall(next) >= SHOWN * self.misfit(next);
+        let shown = |next: &Fit| fall(next) >= NEAR_BEST * most && fall(next) >= MIN_CHI2_DROP * self.misfit(next);
         let closed = sought.into_iter().filter(shown).map(|next| {
             let open = self.fitted(&next.platform, next.modes, STEPS, Domain::Open);
             self.fitted(&open.platform, open.modes, STEPS, Domain::Closed)
@@ -214,18 +217,18 @@ impl Problem {
     }
 
     /// For each direction (legs, gauges, all), what the fit leaves there at each frequency, relative, with its weight.
-    fn directions(&self, fit: &Fit) -> Vec<(Place, Direction)> {
-        let places: Vec<Place> = (0..6).map(Place::Leg).chain((0..6).map(Place::Gauge)).chain([Place::Legs]).collect();
-        let mut all: Vec<_> = places.into_iter().map(|place| (place, Vec::with_capacity(self.points.len()))).collect();
+    fn directions(&self, fit: &Fit) -> Vec<(Location, Direction)> {
+        let places = (0..6).map(Location::Leg).chain((0..6).map(Location::Gauge)).chain([Location::Legs]);
+        let mut all: Vec<_> = places.map(|place| (place, Vec::with_capacity(self.points.len()))).collect();
         for point in &self.points {
             let at = self.evaluated(point, fit);
             let missing = sum(&point.plant, &at.factors.plant, -1.0);
             for (place, list) in &mut all {
                 let one = |index: usize| std::array::from_fn(|k| [f64::from(u8::from(k == index)), 0.0]);
                 let effect = match place {
-                    Place::Leg(leg) => Self::effect(&at, &at.factors, &one(*leg), &[[0.0; 2]; 6]),
-                    Place::Gauge(gauge) => Self::effect(&at, &at.factors, &[[0.0; 2]; 6], &one(*gauge)),
-                    Place::Legs | Place::Gauges => at.factors.plant,
+                    Location::Leg(leg) => Self::effect(&at, &at.factors, &one(*leg), &[[0.0; 2]; 6]),
+                    Location::Gauge(gauge) => Self::effect(&at, &at.factors, &[[0.0; 2]; 6], &one(*gauge)),
+                    Location::Legs | Location::Gauges => at.factors.plant,
                 };
                 let (mut product, mut weight) = ([0.0; 2], 0.0);
                 for (i, j) in (0..36).map(|k| (k / 6, k % 6)) {
@@ -257,8 +260,8 @@ impl Problem {
         let mut chosen = Vec::new();
         for (_, mode) in best.into_iter().take(PLACES) {
             chosen.push(mode);
-            if mode.place == Place::Legs {
-                chosen.push(Resonance { place: Place::Gauges, ..mode });
+            if mode.place == Location::Legs {
+                chosen.push(Resonance { place: Location::Gauges, ..mode });
             }
         }
         chosen
@@ -271,12 +274,13 @@ impl Problem {
         let shows = |hertz: f64| {
             directions.iter().all(|(place, list)| {
                 let part = match place {
-                    Place::Gauge(_) => PARTICIPATIONS[0],
-                    Place::Legs | Place::Gauges => PARTICIPATIONS[1],
-                    Place::Leg(_) => 1.0,
+                    Location::Gauge(_) => PARTICIPATIONS[0],
+                    Location::Legs | Location::Gauges => PARTICIPATIONS[1],
+                    Location::Leg(_) => 1.0,
                 };
                 LEAST_SHOWN.iter().all(|ratio| {
-                    shaped(list, hertz, *ratio).is_some_and(|(_, norm)| part * part * norm > 2.0 * SHOWN * misfit)
+                    shaped(list, hertz, *ratio)
+                        .is_some_and(|(_, norm)| part * part * norm > 2.0 * MIN_CHI2_DROP * misfit)
                 })
             })
         };
@@ -292,8 +296,7 @@ impl Problem {
 /// Product of what a list holds with the shape r² H, less constant and slope over the band around `hertz`, and the shape's norm. `None` if
 /// the list covers too little of the band.
 fn shaped(list: &[(f64, Complex, f64)], hertz: f64, ratio: f64) -> Option<(Complex, f64)> {
-    let half = if ABOUT[0] * ratio > ABOUT[1] { ABOUT[0] * ratio } else { ABOUT[1] };
-    let half = if half < 0.5 { half } else { 0.5 };
+    let half = libm::fmin(libm::fmax(HALF_BAND[0] * ratio, HALF_BAND[1]), 0.5);
     let first = list.partition_point(|(at, ..)| *at < hertz * (1.0 - half));
     let behind = list.partition_point(|(at, ..)| *at <= hertz * (1.0 + half));
     let part = &list[first..behind];

@@ -164,9 +164,9 @@ fn a_board_does_what_the_controller_says_whatever_happens() {
         let missed = if chance(40) { 1 + random.next_u32() % 3 } else { 0 };
         let missed = if random.next_u32() % 1000 == 0 { 100 + random.next_u32() % 2 } else { missed };
         if random.next_u32() % 20 == 0 {
-            exchange.orders.request = REQUESTS[random.next_u32() as usize % 6];
-            exchange.orders.command[0] = u64::from(random.next_u32() % 5);
-            exchange.orders.command[2] = tick;
+            exchange.command.request = REQUESTS[random.next_u32() as usize % 6];
+            exchange.command.command[0] = u64::from(random.next_u32() % 5);
+            exchange.command.command[2] = tick;
         }
         exchange.silence.heard();
         {
@@ -177,7 +177,7 @@ fn a_board_does_what_the_controller_says_whatever_happens() {
             bench.gauge_fault = gauge_fails.then_some(Fault::Blank);
             bench.write_fault = write_fails.then_some(Fault::ReadBack);
         }
-        let (orders, codes) = (exchange.orders, parts.0.borrow().codes);
+        let (orders, codes) = (exchange.command, parts.0.borrow().codes);
         let restarted = board.tick(&mut exchange, TargetStatus { missed, stop, amplifier });
 
         let mut events = carried;
@@ -226,9 +226,9 @@ fn a_code_taken_with_another_shift_is_seen() {
     let mut differs = false;
     for k in 0..50 {
         parts.0.borrow_mut().codes = [(1 << 17) + 100 * k; 6];
-        exchange.orders.request = if k == 0 { Request::Arm } else { Request::Run };
+        exchange.command.request = if k == 0 { Request::Arm } else { Request::Run };
         exchange.silence.heard();
-        let orders = exchange.orders;
+        let orders = exchange.command;
         board.tick(&mut exchange, TargetStatus::default());
         let codes = parts.0.borrow().codes;
         by_hand.tick(&orders.command, codes.map(|code| sensing::CONVERTER.reading((code + 2) >> 1)), orders.request, 0);
@@ -281,7 +281,7 @@ fn converters_that_did_not_start_never_get_power_until_a_new_acknowledgement_sta
     {
         exchange.silence.heard();
         exchange.report.health.events = 0;
-        exchange.orders.request = request;
+        exchange.command.request = request;
         board.tick(&mut exchange, TargetStatus::default());
         assert_eq!(exchange.report.health.events & CONVERTER, CONVERTER);
     }
@@ -295,7 +295,7 @@ fn converters_that_did_not_start_never_get_power_until_a_new_acknowledgement_sta
     for request in [Request::RampDown, Request::None, Request::Acknowledge, Request::None] {
         for _ in 0..20_000 {
             exchange.silence.heard();
-            exchange.orders.request = request;
+            exchange.command.request = request;
             board.tick(&mut exchange, TargetStatus::default());
         }
     }
@@ -320,7 +320,7 @@ fn a_converter_that_failed_names_the_cause_and_one_acknowledgement_is_enough_onc
     for stop in [false, true] {
         let (parts, mut board, mut exchange) = moving();
         let mut run = |exchange: &mut Exchange, request: Request, ticks: u32, stop: bool| {
-            exchange.orders.request = request;
+            exchange.command.request = request;
             for _ in 0..ticks {
                 exchange.silence.heard();
                 board.tick(exchange, TargetStatus { stop, ..TargetStatus::default() });
@@ -366,7 +366,7 @@ fn a_machine_that_stood_still_ramps_down_and_its_record_says_so() {
             exchange.silence.heard();
             board.tick(exchange, TargetStatus { missed, ..TargetStatus::default() });
         };
-        exchange.orders.request = Request::Arm;
+        exchange.command.request = Request::Arm;
         (0..ARMED).for_each(|_| tick(&mut exchange, 0));
         assert!(exchange.report.amplifier_on);
         exchange.report.health.events = 0;
@@ -388,7 +388,7 @@ fn a_machine_that_stood_still_ramps_down_and_its_record_says_so() {
 fn a_fault_of_an_amplifier_switches_off_in_its_tick_and_is_shown_until_it_is_gone() {
     let (parts, mut board, mut exchange) = moving();
     let mut run = |exchange: &mut Exchange, request: Request, ticks: u32, amplifier: bool| {
-        exchange.orders.request = request;
+        exchange.command.request = request;
         exchange.report.health.events = 0;
         for _ in 0..ticks {
             exchange.silence.heard();
@@ -419,7 +419,7 @@ fn a_fault_of_an_amplifier_switches_off_in_its_tick_and_is_shown_until_it_is_gon
 fn without_its_background_a_board_ramps_down_whatever_was_asked_for() {
     let (_, mut board, mut exchange) = moving();
     let mut ticks = |exchange: &mut Exchange, request: Request, count: u32| {
-        exchange.orders.request = request;
+        exchange.command.request = request;
         for _ in 0..count {
             exchange.silence.heard();
             board.tick(exchange, TargetStatus::default());

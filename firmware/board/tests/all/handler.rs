@@ -48,15 +48,15 @@ fn orders_reach_the_tick_all_at_once() {
     bench.exchange.report.phase = Phase::Running;
     bench.expect(&setpoint, Reply::Done);
     bench.expect(&Request::Supervise { request: 2 }, Reply::Done);
-    assert_eq!(bench.exchange.orders.request, Wanted::Run);
-    assert_eq!(bench.exchange.orders.command[..], words);
+    assert_eq!(bench.exchange.command.request, Wanted::Run);
+    assert_eq!(bench.exchange.command.command[..], words);
     assert!(!bench.exchange.silence.tick(), "the host was heard");
     // A host that comes anew has not asked for anything.
     bench.ask(&Request::Hello, |reply| {
         let Reply::Identity(identity) = reply else { unreachable!() };
         assert_eq!((identity.counted, identity.stages), (CostUnit::Nothing, 0));
     });
-    assert_eq!(bench.exchange.orders.request, Wanted::None);
+    assert_eq!(bench.exchange.command.request, Wanted::None);
 }
 
 #[test]
@@ -69,7 +69,7 @@ fn what_was_commanded_before_the_machine_stopped_running_is_forgotten() {
             bench.expect(&Request::Setpoint { words: Bytes(&words) }, Reply::Done);
         }
         bench.exchange.prepare();
-        assert_eq!(bench.exchange.orders.command[0] == 2, kept, "{phase:?}");
+        assert_eq!(bench.exchange.command.command[0] == 2, kept, "{phase:?}");
     }
 }
 
@@ -93,12 +93,12 @@ fn what_is_refused_changes_nothing() {
         (Request::LockstepReset { config: Bytes(&good) }, Refusal::State),
         (Request::LockstepStep { input: Bytes(&[]) }, Refusal::State),
     ];
-    let (orders, settings) = (bench.exchange.orders, bench.exchange.settings().to_words());
+    let (orders, settings) = (bench.exchange.command, bench.exchange.settings().to_words());
     let digest = bench.machine.digest();
     for (request, refusal) in refused {
         bench.expect(&request, Reply::Refused(refusal));
-        assert_eq!(bench.exchange.orders.command, orders.command);
-        assert_eq!(bench.exchange.orders.request, orders.request);
+        assert_eq!(bench.exchange.command.command, orders.command);
+        assert_eq!(bench.exchange.command.request, orders.request);
         assert_eq!(bench.exchange.settings().to_words(), settings);
         assert!(bench.exchange.lockstep.is_none());
         assert_eq!(bench.machine.digest(), digest);

@@ -53,7 +53,7 @@ fn stage(line: &Line) -> Stage {
 
 fn given(line: &Line) -> ([Real; 6], [u64; 2]) {
     line.with(|rig| {
-        let command = &rig.exchange.orders.command;
+        let command = &rig.exchange.command.command;
         (core::array::from_fn(|axis| Real::from_bits(command[CORRECTION + axis])), [command[0], command[1]])
     })
 }
@@ -142,9 +142,9 @@ fn a_pass_begins_in_a_machine_that_runs_at_rest_and_nowhere_else() {
     line.with(|rig| rig.exchange.report.status |= controller::GENERATOR_BUSY);
     assert_eq!(refused(&mut client, &begin), Refusal::State);
     line.with(|rig| rig.exchange.report.status &= !controller::GENERATOR_BUSY);
-    let kind = line.with(|rig| core::mem::replace(&mut rig.exchange.orders.command[0], CommandKind::Trajectory.word()));
+    let kind = line.with(|rig| core::mem::replace(&mut rig.exchange.command.command[0], CommandKind::Trajectory.word()));
     assert_eq!(refused(&mut client, &begin), Refusal::State);
-    line.with(|rig| rig.exchange.orders.command[0] = kind);
+    line.with(|rig| rig.exchange.command.command[0] = kind);
     let words = bytes(&wave(1e-6, 5.0).to_words());
     done(&mut client, &Request::Wave { action: WaveAction::Start, words: Bytes(&words) });
     assert_eq!(refused(&mut client, &begin), Refusal::State);

@@ -57,7 +57,7 @@ fn number(line: &Line) -> u64 {
 }
 
 fn kind(line: &Line) -> u64 {
-    line.with(|rig| rig.exchange.orders.command[0])
+    line.with(|rig| rig.exchange.command.command[0])
 }
 
 /// Low for two ticks, then high in the next one, whose number is given.
@@ -85,11 +85,11 @@ fn a_command_that_waits_is_in_force_from_the_tick_after_the_edge_on() {
     let at = rise(&line);
     assert_ne!(line.with(|rig| rig.exchange.report.health.events) & EDGE, EDGE, "none of the events that are told");
     assert_eq!(edge(&mut client), EdgeStatus { stage: Stage::Begun.word() as u8, edges: 2, tick: at });
-    assert_eq!(bytes(&line.with(|rig| rig.exchange.orders.command)), words);
+    assert_eq!(bytes(&line.with(|rig| rig.exchange.command.command)), words);
     line.tick(2);
     assert_ne!(line.with(|rig| rig.exchange.report.status) & GENERATOR_BUSY, 0);
     // Once.
-    line.with(|rig| rig.exchange.orders.command[0] = CommandKind::Hold.word());
+    line.with(|rig| rig.exchange.command.command[0] = CommandKind::Hold.word());
     rise(&line);
     assert_eq!((kind(&line), edge(&mut client).edges), (CommandKind::Hold.word(), 3));
 }
@@ -184,8 +184,8 @@ fn what_waits_is_refused_at_an_edge_in_motion() {
         done(&mut client, &order);
         // A motion that nobody ordered over the link, so that it does not drop what waits.
         line.with(|rig| {
-            rig.exchange.orders.command[0] = CommandKind::Move.word();
-            rig.exchange.orders.command[5] = 1e-6_f64.to_bits();
+            rig.exchange.command.command[0] = CommandKind::Move.word();
+            rig.exchange.command.command[5] = 1e-6_f64.to_bits();
         });
         line.tick(3);
         assert_ne!(line.with(|rig| rig.exchange.report.status) & GENERATOR_BUSY, 0);
@@ -207,8 +207,8 @@ fn what_waits_is_refused_at_an_edge_in_motion() {
                     let course = specgen_runtime::pass::Course { spacing: 10, before: 50, ticks: 100, trajectory: 0 };
                     assert!(exchange.source.player.as_mut().unwrap().begin(course));
                 } else if matches!(order, Request::Wave { .. }) {
-                    exchange.orders.command[0] = CommandKind::Trajectory.word();
-                    exchange.orders.command[1] = 99;
+                    exchange.command.command[0] = CommandKind::Trajectory.word();
+                    exchange.command.command[1] = 99;
                 } else {
                     exchange.report.phase = Phase::Holding;
                     exchange.prepare();

@@ -10,7 +10,7 @@
 //! setpoint   h_d, ḣ_d, ḧ_d at t_{n+1}
 //! load       p = (J⁻ᵀ(M ḧ_d + C ḣ_d + G + K_e (h_d − h_e)) − f_rest)/k_a      known deflection of the legs, (7)
 //!            + J⁻ᵀ k_v ė/k_a + τ (Δl(h_d(t_{n+1})) − Δl(h_d(t_n)))/T                  damping, lead
-//! legs       q = Δl(h_d) + p + J⁻ᵀ(k_p e + s)/k_a − δ̂ − φ̂ ;  u = Γ⁻¹(q)       limited: q̂ is what was really requested
+//! legs       q = Δl(h_d) + p + J⁻ᵀ(k_p e + s)/k_a − δ̂ − φ̂ ;  u = Γ⁻¹(q)       limited: q̂ is q within the limits
 //! ```
 //! N is the modal notch. A correction c that was learned or prepared for the motion (`specgen_runtime::correction`)
 //! adds J c to q; the innovation does not see it, nor the damping. Active damping D(z) e, if the spec has it, is part
@@ -69,7 +69,7 @@ pub fn advance<P: Platform>(
     let moved = p.hands_over() && state.generator.can_stop();
     let setpoint_status = state.generator.tick_as(p.setpoints(), kind, &input.command);
     if moved && !state.generator.can_stop() {
-        rest(p, config, state);
+        integral_to_estimates(p, config, state);
     }
     let (demand, load) = known_load(p, config, state);
     let correction_held = state.correction.follow(p.correction(), &input.correction);
@@ -86,7 +86,7 @@ pub fn advance<P: Platform>(
     }
     let mut request = each(|leg| demand[leg] + state.load[leg] + reaction[leg]);
     if entered {
-        hand_over(p, config, state, &request);
+        bumpless_transfer(p, config, state, &request);
         request = each(|leg| state.legs[leg].requested);
     } else {
         state.transfer.fade(p.transfer_keep(), p.transfer_negligible());
@@ -171,7 +171,7 @@ fn enter_mode<P: Platform>(p: P, config: &Config<P>, state: &mut State<P>) -> bo
 /// Bumpless change of mode: the difference between the legs' position and the first `request` of a mode (m of each leg)
 /// goes to the estimates, or to the integral if every axis has one. Otherwise it becomes an offset that fades.
 #[cold]
-fn hand_over<P: Platform>(p: P, config: &Config<P>, state: &mut State<P>, request: &[P::Real; LEGS]) {
+fn bumpless_transfer<P: Platform>(p: P, config: &Config<P>, state: &mut State<P>, request: &[P::Real; LEGS]) {
     let held = each(|leg| state.legs[leg].requested - request[leg]);
     let mode = config.mode;
     let mut offset = [P::Real::ZERO; LEGS];
@@ -187,8 +187,8 @@ fn hand_over<P: Platform>(p: P, config: &Config<P>, state: &mut State<P>, reques
     state.transfer.begin(offset);
 }
 
-/// Enters or leaves the fallback. The requests of damping and gains against the oscillation end at once: if they were
-/// frozen, the platform would keep an error of that size. Integral and estimates stay.
+/// Enters or leaves the fallback. Damping starts again from zero: its present request, against the oscillation, would
+/// otherwise stay as an error of the platform. Integral and estimates stay.
 #[cold]
 #[inline(never)]
 fn fall_back<P: Platform>(state: &mut State<P>, fallback: Fallback) {
@@ -216,7 +216,7 @@ fn weaken<T: Real>(fallback: Fallback, values: &mut [T; 6]) {
 /// act on one error; otherwise the integral would return, at the rate k_I/(1 + k_p), what the estimates unlearn at
 /// their rate.
 #[cold]
-fn rest<P: Platform>(p: P, config: &Config<P>, state: &mut State<P>) {
+fn integral_to_estimates<P: Platform>(p: P, config: &Config<P>, state: &mut State<P>) {
     let mode = config.mode;
     if mode.feeds_back() && mode.law() != Law::Invhys {
         let held = transform(p.force_to_modes(), &state.integral.force);

@@ -28,7 +28,7 @@ impl Setpoints {
     }
 
     /// A pass has its own command: only the request is taken.
-    pub fn wish(&mut self, wish: OperatorRequest) {
+    pub fn accept(&mut self, wish: OperatorRequest) {
         if let Some(command) = wish.command.filter(|_| !self.source.passes()) {
             self.source.cancel_awaited();
             self.command = command;
@@ -156,7 +156,7 @@ mod tests {
 
     fn setpoints() -> Setpoints {
         let mut setpoints = Setpoints::new();
-        setpoints.wish(OperatorRequest { command: Some([5; COMMAND_WORDS]), request: Request::Run });
+        setpoints.accept(OperatorRequest { command: Some([5; COMMAND_WORDS]), request: Request::Run });
         setpoints
     }
 
@@ -209,7 +209,7 @@ mod tests {
     #[test]
     fn a_wish_keeps_what_it_does_not_name() {
         let mut setpoints = setpoints();
-        setpoints.wish(OperatorRequest { command: None, request: Request::Hold });
+        setpoints.accept(OperatorRequest { command: None, request: Request::Hold });
         assert_eq!((setpoints.request(), setpoints.next(Phase::Running)), (Request::Hold, [5; COMMAND_WORDS]));
     }
 
@@ -255,7 +255,7 @@ mod tests {
         // Other orders, and a machine that does not run.
         let orders: [fn(&mut Setpoints); 6] = [
             |setpoints| setpoints.stop_waiting(),
-            |setpoints| setpoints.wish(OperatorRequest { command: Some([1; COMMAND_WORDS]), request: Request::None }),
+            |setpoints| setpoints.accept(OperatorRequest { command: Some([1; COMMAND_WORDS]), request: Request::None }),
             |setpoints| setpoints.start(wave(9)),
             |setpoints| setpoints.stop(),
             |setpoints| setpoints.pass(player()),
@@ -276,7 +276,7 @@ mod tests {
         // At rest, and under a trajectory.
         for (command, stage_then) in [(0, pending::Stage::Begun), (3, pending::Stage::Refused)] {
             let mut setpoints = setpoints();
-            setpoints.wish(OperatorRequest { command: Some([command; COMMAND_WORDS]), request: Request::None });
+            setpoints.accept(OperatorRequest { command: Some([command; COMMAND_WORDS]), request: Request::None });
             setpoints.wait_for_edge(EdgeCommand::Wave, Some(wave(10)));
             tick(&mut setpoints, 1, LOW, 0);
             tick(&mut setpoints, 2, HIGH, 0);
@@ -291,7 +291,7 @@ mod tests {
         let mut setpoints = setpoints();
         setpoints.pass(player());
         assert!(setpoints.take_player().is_none(), "under way");
-        setpoints.wish(OperatorRequest { command: Some([7; COMMAND_WORDS]), request: Request::Hold });
+        setpoints.accept(OperatorRequest { command: Some([7; COMMAND_WORDS]), request: Request::Hold });
         assert_eq!(setpoints.request(), Request::Hold);
         let state = controller::state_at_reset();
         for number in 0..6 {

@@ -70,7 +70,7 @@ impl<'a> LinkHandler<'a> {
 
     /// Refuses while another host is in control, or the queue of commands is full.
     fn admit(&self) -> Result<(), Refusal> {
-        let others = !self.console.operator.may_order(self.host, self.now) || self.console.is_full();
+        let others = !self.console.operator.may_take_control(self.host, self.now) || self.console.is_full();
         if others { Err(Refusal::Busy) } else { Ok(()) }
     }
 }
@@ -262,7 +262,7 @@ mod tests {
     use crate::bench::{row, said};
     use crate::capture::Capture;
     use crate::handover::LoopCommand;
-    use crate::operator::{Operator, Timeout};
+    use crate::operator::{Arbiter, Timeout};
     use crate::passes::Passes;
     use controller::supervised::MACHINE_INPUT_WORDS;
     use controller::{COMMAND_WORDS, CONFIG_NAMES, DESCRIPTION};
@@ -274,7 +274,7 @@ mod tests {
     const NOW: u64 = 5_000_000;
 
     fn console(phase: Phase) -> Console {
-        let operator = Operator::new(true, Timeout { silence: 1 << 40, idle: 1 << 40 });
+        let operator = Arbiter::new(true, Timeout { silence: 1 << 40, idle: 1 << 40 });
         let mut console = Console::new(operator, Capture::new(None).unwrap().0, Config::new());
         console.update(&row(7), said(phase), NOW - 3_000_000);
         console
@@ -377,7 +377,7 @@ mod tests {
         for (stops, request) in [(1, 3), (2, 4)] {
             assert_eq!(ask_as(&mut console, B, false, &supervise(request)), DONE);
             assert_eq!(console.stops, stops);
-            assert_eq!(console.operator.wish().unwrap().request.word(), u64::from(request));
+            assert_eq!(console.operator.take_pending().unwrap().request.word(), u64::from(request));
         }
         // What was sent before another host's stop moves nothing.
         assert_eq!(ask_as(&mut console, A, true, &supervise(2)), refused(Refusal::Busy));
@@ -397,11 +397,11 @@ mod tests {
         let short = Request::Setpoint { words: Bytes(&words[8..]) };
         assert_eq!(ask(&mut console(Phase::Holding), &setpoint), refused(Refusal::State));
         let mut console = console(Phase::Running);
-        console.operator.wish();
+        console.operator.take_pending();
         assert_eq!(ask(&mut console, &short), refused(Refusal::Length { expected: COMMAND_WORDS as u16 }));
-        assert!(console.operator.wish().is_none());
+        assert!(console.operator.take_pending().is_none());
         assert_eq!(ask(&mut console, &setpoint), DONE);
-        assert_eq!(console.operator.wish().unwrap().command, Some([3; COMMAND_WORDS]));
+        assert_eq!(console.operator.take_pending().unwrap().command, Some([3; COMMAND_WORDS]));
         // A wave commands in its place.
         assert_eq!(console.start_wave(&Settings::still(), false), Err(Refusal::State), "under a trajectory");
         console.operator.set_by_link([0; COMMAND_WORDS]);
@@ -526,7 +526,7 @@ mod tests {
     #[test]
     fn orders_for_the_edge_of_an_input_line_wait_for_a_machine_at_rest() {
         let mut console = console(Phase::Running);
-        console.operator.wish();
+        console.operator.take_pending();
         let (mut events, mut stream) = (0, Stream::default());
         let command = [1; COMMAND_WORDS];
         let mut handler = LinkHandler::new(&mut console, A, false, &mut events, &mut stream, NOW);

@@ -84,7 +84,7 @@ impl Link {
                 stream: Stream::default(),
             }
         };
-        let crowded = hosts.accept(now, fresh, |line| console.operator.is_hosts(line.id));
+        let crowded = hosts.accept(now, fresh, |line| console.operator.is_owner(line.id));
         traffic.closed += crowded.len() as u64;
         let events = console.take_events();
         let (before, mut stopper) = (console.stops, None);
@@ -180,7 +180,7 @@ mod tests {
     use super::*;
     use crate::bench::{row, said};
     use crate::capture::Capture;
-    use crate::operator::{Operator, Timeout};
+    use crate::operator::{Arbiter, Timeout};
     use controller::supervised::Phase;
     use controller::{CONFIG_WORDS, Config};
     use specgen_link::client::{self, Client as Host, ClientError, Port};
@@ -211,7 +211,7 @@ mod tests {
     impl World {
         fn new(name: &str) -> Rc<RefCell<Self>> {
             let path = std::env::temp_dir().join(format!("rt-pc-link-{name}-{}", std::process::id()));
-            let operator = Operator::new(true, Timeout { silence: SILENCE, idle: 1 << 40 });
+            let operator = Arbiter::new(true, Timeout { silence: SILENCE, idle: 1 << 40 });
             let mut console = Console::new(operator, Capture::new(None).unwrap().0, Config::new());
             console.said = Some(said(Phase::Holding));
             Rc::new(RefCell::new(Self { link: Link::listen(&path).unwrap(), console, now: 10, path }))
@@ -397,7 +397,7 @@ mod tests {
         // A host that hangs up while the machine is powered is missed by nobody else.
         drop(second);
         world.borrow_mut().serve();
-        assert!(!world.borrow().console.operator.linked(world.borrow().now));
+        assert!(!world.borrow().console.operator.host_in_control(world.borrow().now));
         assert_eq!(host(&world, 3).ask(&arm).map_err(refused), Ok(Reply::Done));
     }
 

@@ -15,13 +15,15 @@ use specgen_runtime::{ControlMode, Law};
 
 /// Lowest factor checked.
 const LOWEST: f64 = 1e-4;
-/// Suggested value over the limit: right at the limit no other value would be stable.
+/// Suggested value over the largest stable one.
 const SLACK: f64 = 0.95;
-/// Margins below these cause a warning.
+/// A gain margin below this causes a warning.
 const THIN_GAIN: f64 = 1.5;
+/// A delay margin below this, in ticks, causes a warning.
 const THIN_DELAY: f64 = 0.5;
-/// Above these times its target of the compliance, and above this |S|, active damping is ineffective or too strong.
+/// Active damping is ineffective if a mode's compliance exceeds the target this many times.
 const MOST_COMPLIANT: f64 = 1.3;
+/// Active damping is too strong if |S| exceeds this.
 const MOST_SENSITIVE: f64 = 2.2;
 
 /// A platform that [`super::ModalBasis`] refuses.
@@ -37,7 +39,7 @@ pub(super) fn no_modes(model: &Model) -> Diagnostic {
     )
 }
 
-/// Refuses unstable control modes. Each finding suggests a value; a spec with all suggested values is accepted.
+/// Refuses unstable control modes. If smaller values are stable, each finding suggests some; a spec with all of them is accepted.
 pub(super) fn check(
     model: &Model,
     task: &TaskSpace,
@@ -73,7 +75,7 @@ pub(super) fn check(
     if findings.is_empty() { Ok(()) } else { Err(findings) }
 }
 
-/// Lowest frequency of an unknown structural mode over that of the platform's lowest: below, no law that follows a path tolerates one.
+/// Least ratio of `robust.structure.f0` to the platform's lowest mode: a lower structural mode would make every law unstable.
 const LEAST_FROM: f64 = 1.6;
 
 /// Refuses a range of structural modes that begins too close to the modes of the platform.
@@ -151,7 +153,7 @@ impl Case<'_> {
             .filter(|factor| self.is_stable(laws, &tuning(*factor)))
     }
 
-    fn what(&self, law: ControlMode, radius: f64) -> String {
+    fn what(&self, control_mode: ControlMode, radius: f64) -> String {
         let touching = if self.closed_loop.environment == [0.0; 6] { "" } else { ", free or touching the work piece" };
         let [low, high] = self.model.adaptation.gain_ratio;
         let gauges = super::super::gauge_lag_text(self.closed_loop.gauge_lag);
@@ -159,7 +161,7 @@ impl Case<'_> {
             "control mode {} is unstable on this platform: the loop sampled every {} s, with modes from {:.0} Hz to \
              {:.0} Hz (damping ratio {:.3} of the first) and an amplifier lag of {} s{gauges}, has spectral radius {radius:.4} \
              somewhere in gain_ratio [{low}, {high}]{touching}; it must be below 1",
-            law,
+            control_mode,
             self.closed_loop.period,
             self.closed_loop.basis.frequencies[0] / TAU,
             self.closed_loop.basis.frequencies[5] / TAU,
@@ -190,8 +192,8 @@ impl Case<'_> {
                 "feeding the measured force of the work piece forward closes a loop, which is stable up to {factor} times the \
                  declared stiffness; or set interaction = \"none\" or \"modelled\""
             ),
-            None => "more damping (control.modal_damping) or a longer period would be needed: check both, \
-                     actuator.axial_stiffness and amplifier.lag"
+            None => "no stiffness is stable: check control.modal_damping, timing.period, actuator.axial_stiffness and \
+                     amplifier.lag; or set interaction = \"none\" or \"modelled\""
                 .to_owned(),
         };
         let keys = ["control.environment.stiffness", "control.interaction", "control.modal_damping", "control"];
@@ -266,8 +268,8 @@ impl Case<'_> {
     fn nothing_helps(&self) -> String {
         let notch = if self.closed_loop.notch.is_some() { "" } else { "a notch (control.notch_damping), " };
         format!(
-            "no smaller value of these alone is stable: a higher [robust.structure] f0 if no mode is below it, {notch}a shorter timing.period, more control.modal_damping or a \
-             narrower adaptation.gain_ratio would help"
+            "no smaller value of these alone is stable: a higher [robust.structure] f0 if no mode is below it, {notch}a shorter timing.period, or a machine with more damping \
+             or legs whose gains differ less would help; measure control.modal_damping and adaptation.gain_ratio, then correct them"
         )
     }
 }
@@ -291,13 +293,12 @@ pub(super) fn thin(
                 || one.delay_margin_ticks.is_some_and(|delay| delay < THIN_DELAY)
         });
         if let Some(one) = worst {
-            let or = |value: Option<f64>, text: &str| value.map_or(text.to_owned(), |x| format!("{x:.2}"));
-            let message = format!(
-                "control mode {} is stable with a gain margin of {} and a delay margin of {} ticks",
-                one.law,
-                or(one.gain_margin, "enough"),
-                or(one.delay_margin_ticks, "enough")
-            );
+            let gain = one.gain_margin.filter(|gain| *gain < THIN_GAIN);
+            let delay = one.delay_margin_ticks.filter(|delay| *delay < THIN_DELAY);
+            let gain = gain.map(|gain| format!("a gain margin of {gain:.2}, below {THIN_GAIN}"));
+            let delay = delay.map(|delay| format!("a delay margin of {delay:.2} ticks, below {THIN_DELAY}"));
+            let thin: Vec<String> = gain.into_iter().chain(delay).collect();
+            let message = format!("control mode {} is stable with {}", one.law, thin.join(" and "));
             let help = "reduce or omit these values: the compiler's own are stable at twice the gain".to_owned();
             findings.push(Diagnostic::at(&model.spans, keys, codes::THIN_MARGIN, message, help));
         }

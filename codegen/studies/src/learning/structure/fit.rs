@@ -12,7 +12,7 @@ use specgen_numerics::{Matrix6, multiply6};
 use super::super::convergence::Learnable;
 use super::super::matrix::{Matrix6c, inverse, left, multiply};
 use super::super::response::Bin;
-use super::{Place, StructuralMode};
+use super::{Location, StructuralMode};
 
 /// Number of parameters of the platform: W, D, λ, dead time and lag; index of the first of each.
 const PLATFORM: usize = 50;
@@ -47,7 +47,7 @@ pub(super) struct Point {
 /// A mode that is fitted: ln f_n, ln ζ, a.
 #[derive(Clone, Copy)]
 pub(super) struct Resonance {
-    pub(super) place: Place,
+    pub(super) place: Location,
     pub(super) values: [f64; 3],
 }
 
@@ -60,11 +60,11 @@ impl Resonance {
     }
 
     fn of_leg(&self, leg: usize) -> bool {
-        self.place == Place::Legs || self.place == Place::Leg(leg)
+        self.place == Location::Legs || self.place == Location::Leg(leg)
     }
 
     fn of_gauge(&self, gauge: usize) -> bool {
-        self.place == Place::Gauges || self.place == Place::Gauge(gauge)
+        self.place == Location::Gauges || self.place == Location::Gauge(gauge)
     }
 
     /// Number of its parameters.

@@ -47,7 +47,7 @@ fn measured(
     learnable: &Learnable,
     compiled: &Compilation,
     draw: &mut Draw,
-    modes: &[(Place, f64, f64, f64)],
+    modes: &[(Location, f64, f64, f64)],
 ) -> Vec<Bin> {
     let closed_loop = learnable.closed_loop();
     let mut hertz = vec![100.0];
@@ -83,10 +83,10 @@ fn measured(
                 let h = over([1.0, 0.0], [1.0 - r * r, 2.0 * ratio * r]);
                 let mount = plus([1.0, 0.0], h.map(|x| part * r * r * x));
                 for index in 0..6 {
-                    if *place == Place::Legs || *place == Place::Leg(index) {
+                    if *place == Location::Legs || *place == Location::Leg(index) {
                         legs[index] = times(legs[index], h);
                     }
-                    if *place == Place::Gauges || *place == Place::Gauge(index) {
+                    if *place == Location::Gauges || *place == Location::Gauge(index) {
                         gauges[index] = times(gauges[index], mount);
                     }
                 }
@@ -129,11 +129,11 @@ fn found_of(cases: &[u64]) -> [u32; 2] {
         let mut draw = Draw(ChaCha8Rng::seed_from_u64(1 + case));
         let index = draw.within(0.0, 5.999) as usize;
         let (place, part) = match case % 5 {
-            0 => (Place::Leg(index), 1.0),
-            1 => (Place::Legs, 1.0),
-            2 => (Place::Gauge(index), draw.within(0.3, 0.7)),
-            3 => (Place::Gauges, draw.within(0.3, 0.7)),
-            _ => (Place::Gauges, draw.within(-0.3, -0.1)),
+            0 => (Location::Leg(index), 1.0),
+            1 => (Location::Legs, 1.0),
+            2 => (Location::Gauge(index), draw.within(0.3, 0.7)),
+            3 => (Location::Gauges, draw.within(0.3, 0.7)),
+            _ => (Location::Gauges, draw.within(-0.3, -0.1)),
         };
         let (frequency, ratio) = (draw.within(600.0, 1300.0), draw.within(0.01, 0.05));
         let bins = measured(&learnable, &compiled, &mut draw, &[(place, frequency, ratio, part)]);
@@ -193,9 +193,9 @@ fn none_of_20_machines_without_such_a_mode_shows_one() {
 }
 
 /// Modes of a place, a frequency (Hz) and a participation each.
-fn structure_of(modes: &[(Place, f64, f64)]) -> Structure {
+fn structure_of(modes: &[(Location, f64, f64)]) -> Structure {
     let parameter = |value: f64| Parameter { value, error: 0.1 * value.abs() };
-    let mode = |(place, frequency, part): &(Place, f64, f64)| StructuralMode {
+    let mode = |(place, frequency, part): &(Location, f64, f64)| StructuralMode {
         frequency: parameter(*frequency),
         damping: parameter(RATIO[0]),
         participation: parameter(*part),
@@ -218,30 +218,31 @@ fn a_spec_takes_the_lines_of_a_mode_at_every_place() {
     use StructuralKind::{Frame, Gauge, Leg};
     let line = |place, part| read(&structure_of(&[(place, 812.34, part)]).lines(&[]));
     for index in 0..6 {
-        assert_eq!(line(Place::Leg(index), 1.0), [(Leg, Some(index), 1.0)]);
+        assert_eq!(line(Location::Leg(index), 1.0), [(Leg, Some(index), 1.0)]);
         for part in [LEAST_PART, 0.5, 1.0] {
-            assert_eq!(line(Place::Gauge(index), part), [(Gauge, Some(index), part)]);
-            assert_eq!(line(Place::Gauge(index), -part), [(Frame, None, -part)]);
+            assert_eq!(line(Location::Gauge(index), part), [(Gauge, Some(index), part)]);
+            assert_eq!(line(Location::Gauge(index), -part), [(Frame, None, -part)]);
         }
     }
-    assert_eq!(line(Place::Legs, 1.0), [(Leg, None, 1.0)]);
-    assert_eq!(line(Place::Gauges, 0.5), [(Gauge, None, 0.5)]);
-    assert_eq!(line(Place::Gauges, -0.1), [(Frame, None, -0.1)]);
+    assert_eq!(line(Location::Legs, 1.0), [(Leg, None, 1.0)]);
+    assert_eq!(line(Location::Gauges, 0.5), [(Gauge, None, 0.5)]);
+    assert_eq!(line(Location::Gauges, -0.1), [(Frame, None, -0.1)]);
 }
 
 #[test]
 fn of_modes_that_a_spec_counts_as_one_the_lines_hold_the_one_that_acts_most() {
     use StructuralKind::{Frame, Gauge};
-    let frames = [(Place::Gauge(1), 800.0, -0.1), (Place::Gauge(4), 805.0, -0.3), (Place::Gauges, 790.0, -0.2)];
+    let frames =
+        [(Location::Gauge(1), 800.0, -0.1), (Location::Gauge(4), 805.0, -0.3), (Location::Gauges, 790.0, -0.2)];
     let lines = structure_of(&frames).lines(&[]);
     assert_eq!(read(&lines), [(Frame, None, -0.3), (Frame, None, -0.2)]);
-    let gauges = [(Place::Gauge(1), 800.0, 0.3), (Place::Gauge(2), 800.0, 0.3), (Place::Gauges, 807.0, 0.2)];
+    let gauges = [(Location::Gauge(1), 800.0, 0.3), (Location::Gauge(2), 800.0, 0.3), (Location::Gauges, 807.0, 0.2)];
     assert_eq!(read(&structure_of(&gauges).lines(&[])), [(Gauge, Some(1), 0.3), (Gauge, Some(2), 0.3)]);
     // The spec has it already.
-    let listed = structure_of(&[(Place::Gauge(1), 800.0, 0.3)]).lines(&[]);
+    let listed = structure_of(&[(Location::Gauge(1), 800.0, 0.3)]).lines(&[]);
     let source = reference_spec();
     let text = format!("{}\n{listed}", source.text);
     let model = load(&SpecSource { text, ..source }).0.unwrap();
-    let again = structure_of(&[(Place::Gauge(1), 803.0, 0.4)]).lines(&model.structural_modes);
+    let again = structure_of(&[(Location::Gauge(1), 803.0, 0.4)]).lines(&model.structural_modes);
     assert_eq!(read(&format!("{listed}{again}")), [(Gauge, Some(1), 0.3)]);
 }
