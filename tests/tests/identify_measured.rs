@@ -6,7 +6,10 @@ use crate::identify_support::measured;
 use std::time::Instant;
 
 use specgen::everett::EverettTable;
-use specgen::identify::{Branches, DeadTime, Identification, Options, PredictionError, Record, identify, validate};
+use specgen::identify::response::respond;
+use specgen::identify::{
+    Branches, DeadTime, Identification, Input, Options, PredictionError, Record, choose_grid, identify, validate,
+};
 use specgen_tests::length;
 
 const DRIVE: [f64; 2] = [-90.0, 90.0];
@@ -89,6 +92,70 @@ fn a_table_without_hysteresis_fails_the_limits() {
         }
     }
     assert!(predicted(&straight, &sine, result.report.dead_time).rms_percent > 2.0);
+}
+
+/// Defects that lab records have: each is named, and changes dead time and prediction by at most a tenth, except hum at a
+/// frequency of the drive.
+#[test]
+fn spikes_hum_and_a_step_do_not_spoil_a_measured_record() {
+    let (Some(forc), Some(sine)) = (measured("forc-20hz.csv"), measured("validate-growing-sine-5hz.csv")) else {
+        return;
+    };
+    let options = Options::new(32, DRIVE);
+    let clean = found(&forc, &options);
+    let error = predicted(&clean.table, &sine, clean.report.dead_time).rms_percent;
+    let spoil = |code: &str, change: &dyn Fn(usize) -> f64| {
+        let y = forc.displacement.iter().enumerate().map(|(k, y)| y + change(k)).collect();
+        let record = Record::from_columns("spoilt.csv", forc.time.clone(), forc.drive.clone(), y).unwrap();
+        let spoilt = identify(&record, &options).unwrap();
+        println!("{code}: dead time {:.3} ms", spoilt.report.dead_time * 1e3);
+        assert!(spoilt.warnings.iter().any(|d| d.code == code), "{:#?}", spoilt.warnings);
+        assert!((spoilt.report.dead_time / clean.report.dead_time - 1.0).abs() < 0.1);
+        assert!(predicted(&spoilt.table, &sine, spoilt.report.dead_time).rms_percent < 1.1 * error);
+    };
+    spoil("W0517", &|k| if [18_211, 27_003, 35_500].contains(&k) { 3e-6 } else { 0.0 });
+    spoil("W0517", &|k| if k % 1231 < 5 { 3e-6 } else { 0.0 });
+    spoil("W0521", &|k| 50e-9 * (std::f64::consts::TAU * 50.0 * forc.time[k]).sin());
+    spoil("W0520", &|k| if k > 25_400 { 0.4e-6 } else { 0.0 });
+    // The drive has these frequencies: hum there stays in the fit, and is named.
+    for frequency in [20.0, 40.0, 60.0] {
+        let hum = |time: &f64| 50e-9 * (std::f64::consts::TAU * frequency * time).sin();
+        let y = forc.displacement.iter().zip(&forc.time).map(|(y, time)| y + hum(time)).collect();
+        let record = Record::from_columns("hum.csv", forc.time.clone(), forc.drive.clone(), y).unwrap();
+        let warnings = identify(&record, &options).unwrap().warnings;
+        let named = warnings.iter().any(|d| d.code == "W0521" && d.message.contains("it is in the fit"));
+        assert!(named, "{frequency} Hz: {warnings:#?}");
+    }
+}
+
+/// A growing sine of one second is a record of its own, over the range that it covers.
+#[test]
+fn a_measured_growing_sine_gives_a_table_for_its_range() {
+    let Some(sine) = measured("validate-growing-sine-5hz.csv") else { return };
+    let (range, late) = ([-82.0, 74.0], DeadTime::Fixed(1.14e-4));
+    let found = identify(&sine, &Options::new(16, range)).unwrap_or_else(|d| panic!("{d:#?}"));
+    assert!(found.warnings.iter().any(|d| d.code == "W0522"), "{:#?}", found.warnings);
+    assert!(found.report.dead_time == 0.0 && found.report.dead_time_basis.contains("--dead-time"));
+    let choice = choose_grid(&sine, range, late).unwrap();
+    let best = choice.scores.iter().find(|score| score.grid == choice.best).unwrap();
+    println!("held out: {best:?}");
+    assert!(best.held_out_percent < 0.15, "{best:?}");
+}
+
+/// The drive is noise of large amplitude, the gain of which is hysteresis at low frequencies.
+#[test]
+fn a_measured_wide_band_record_shows_the_resonance() {
+    let Some(wide) = measured("validate-wide-band.csv") else { return };
+    let rows = wide.time.iter().zip(&wide.drive).zip(&wide.displacement);
+    let mut text = "time_s,drive_V,displacement_um\n".to_owned();
+    text.extend(rows.map(|((t, u), y)| format!("{t:?},{u:?},{:?}\n", y * 1e6)));
+    let fitted = respond(Input::Text(&text), "wide.csv", None).unwrap_or_else(|d| panic!("{d:#?}")).value.fitted;
+    println!("{fitted:?}");
+    assert!((fitted.resonance.value - 740.0).abs() < 3.0, "{fitted:?}");
+    assert!((0.015..0.03).contains(&fitted.damping_ratio.value), "{fitted:?}");
+    let lagging = std::f64::consts::TAU * fitted.resonance.value * fitted.lag.value;
+    let gain = fitted.gain.value / (1.0 + lagging * lagging).sqrt();
+    assert!((0.0235e-6..0.0265e-6).contains(&gain), "{gain:e}");
 }
 
 #[test]

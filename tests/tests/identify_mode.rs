@@ -6,7 +6,9 @@ use core::f64::consts::TAU;
 use host_sim::plant::{LegParameters, LegPlant};
 use specgen::identify::mode::ring;
 use specgen::identify::rate::{RateModel, RateOption, identify_rate};
-use specgen::identify::{Drive, Options, PredictionError, Record, Source, predict};
+use specgen::identify::response::respond;
+use specgen::identify::{Drive, Input, Options, PredictionError, Record, Source, predict};
+use std::fmt::Write as _;
 
 const SAMPLE: f64 = 1e-4;
 
@@ -55,11 +57,11 @@ fn wide_band() -> Record {
 }
 
 /// Noise behind two low-passes of `cut` Hz, within 10 V and 90 V.
-fn noise(cut: f64) -> Record {
+fn noise(cut: f64, samples: usize) -> Record {
     let share = 1.0 - (-TAU * cut * SAMPLE).exp();
     let mut random = generator(11);
     let (mut first, mut second) = (0.0, 0.0);
-    let shape: Vec<f64> = (0..8000)
+    let shape: Vec<f64> = (0..samples)
         .map(|_| {
             first += share * (normal(&mut random) - first);
             second += share * (first - second);
@@ -92,7 +94,8 @@ fn a_mode_found_in_the_ring_predicts_a_drive_that_excites_it() {
     println!("  {:?}, near {:?} Hz; then {:?}", without.cause.main, without.cause.resonance, with.cause.main);
     assert!(with.rms_percent < 0.95 && with.rms_percent < 0.8 * without.rms_percent);
     assert_eq!(without.cause.main, Source::Resonance);
-    let [plain, moved] = [RateOption::Creep, RateOption::CreepMode].map(|option| compared(model(option), &noise(40.0)));
+    let [plain, moved] =
+        [RateOption::Creep, RateOption::CreepMode].map(|option| compared(model(option), &noise(40.0, 8000)));
     println!("noise of 40 Hz: {:.3} % by creep, {:.3} % with the mode", plain.rms_percent, moved.rms_percent);
     assert!(moved.rms_percent < 0.75 && moved.rms_percent < 0.8 * plain.rms_percent);
     // The drive ends at 600 Hz, so that the frequency is not better known.
@@ -102,5 +105,30 @@ fn a_mode_found_in_the_ring_predicts_a_drive_that_excites_it() {
 /// Noise that makes the leg ring by more than it moves it: for a moment it goes back while the drive rises, and is where it was.
 #[test]
 fn a_leg_that_rings_is_not_taken_for_a_gauge_that_is_stuck() {
-    assert_eq!(noise(100.0).time.len(), 8000);
+    assert_eq!(noise(100.0, 8000).time.len(), 8000);
+}
+
+/// Noise behind low-passes, at large amplitude: the gauge's own noise leaves coherence around the resonance and far below it, and below
+/// there is hysteresis. The coherence of each bin decides, not the width of the band or the power of the drive in it.
+#[test]
+fn a_noise_record_shows_the_resonance_where_its_bins_are_coherent() {
+    let record = noise(40.0, 100_000);
+    let mut random = generator(19);
+    let mut text = String::from("time_s,drive_V,displacement_um\n");
+    for ((t, u), y) in record.time.iter().zip(&record.drive).zip(&record.displacement) {
+        writeln!(text, "{t:?},{u:?},{:?}", y * 1e6 + 0.6 * normal(&mut random)).unwrap();
+    }
+    let found = respond(Input::Text(&text), "noise.csv", None).unwrap_or_else(|d| panic!("{d:#?}")).value;
+    println!(
+        "{:.0} to {:.0} Hz, {:?}, left out {:?}",
+        found.band[0],
+        found.band[1],
+        found.fitted,
+        found.left_out.len()
+    );
+    let fitted = found.fitted;
+    assert!((fitted.resonance.value / 735.0 - 1.0).abs() < 0.01, "{fitted:?}");
+    assert!((0.7..1.5).contains(&(fitted.damping_ratio.value / 0.015)), "{fitted:?}");
+    // Left out are bins around the resonance, too.
+    assert!(found.left_out.iter().any(|band| band.high > 0.7 * 735.0 && band.high < 1.3 * 735.0), "{found:?}");
 }

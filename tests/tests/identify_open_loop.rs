@@ -28,16 +28,22 @@ fn model(found: &RateIdentification, wanted: RateOption) -> &RateModel {
 }
 
 /// The leg's hysteresis as a spec with the lines of `identify rate` lowers it, from 0 V on.
-fn lowered(found: &RateIdentification, earlier: f64) -> ir::Hysteresis {
-    let mut leg = model(found, RateOption::Creep).clone();
+fn lowered(found: &RateIdentification, option: RateOption, earlier: f64) -> ir::Hysteresis {
+    let mut leg = model(found, option).clone();
     leg.dead_time -= earlier;
     (leg.still.drive_min, leg.still.drive_max) = (0.0, RANGE[1] - RANGE[0]);
-    let lines = spec_lines(RateOption::Creep, &leg, found.report.held, "records/leg-creep.csv", "");
-    let lines = format!("memory  = 64\n{}", lines.lines().skip(1).collect::<Vec<_>>().join("\n"));
+    let lines = spec_lines(option, &leg, found.report.held, "records/leg-creep.csv", "");
+    let mut lines = lines.lines().skip(1);
+    let hysteresis: Vec<&str> = lines.by_ref().take_while(|line| *line != "[actuator]").collect();
+    let actuator: Vec<&str> = lines.collect();
+    let lines = format!("memory  = 64\n{}", hysteresis.join("\n"));
+    let own = "resonance       = \"870 Hz\"        # assumed\ndamping_ratio   = 0.1             # assumed";
+    let actuator = if actuator.is_empty() { own.to_owned() } else { actuator.join("\n") };
     let edits = [
         ("voltage         = [\"0 V\", \"100 V\"]", "voltage = [\"0 V\", \"180 V\"]"),
         ("stacks          = 5", "stacks = 1"),
         ("\"0.1262 um/V\"", "\"0.04 um/V\""),
+        (own, &actuator),
         ("stroke          = \"60 um\"", "stroke = \"7.2 um\""),
         ("slew_rate       = \"40 V/ms\"", "slew_rate = \"400 V/ms\""),
         ("range = [\"0 V\", \"150 V\"]", "range = [\"0 V\", \"200 V\"]"),
@@ -74,12 +80,14 @@ fn feed_forward(hysteresis: &ir::Hysteresis, frequency: f64, ticks: usize) -> Ve
     let table = CreepEverett { still: Everett::<f64, GRID, NODES> { nodes }, creep };
     let mut memory = CreepMemory::<f64, 64, TERMS>::new();
     let (ticks_ahead, limit) = hysteresis.lead.as_ref().map_or((0.0, 0.0), |lead| (lead.ticks, lead.limit));
-    let mut before = 0.0;
+    let bend = hysteresis.lead.as_ref().and_then(|lead| lead.bend).unwrap_or(0.0);
+    let (mut before, mut last) = (0.0, 0.0);
     (1..=ticks)
         .map(|n| {
             let demand = demand(frequency, n as f64 * PERIOD);
-            let lead = ((demand - before) * ticks_ahead).clamp(-limit, limit);
-            before = demand;
+            let change = demand - before;
+            let lead = (change * ticks_ahead + (change - last) * bend).clamp(-limit, limit);
+            (before, last) = (demand, change);
             let drive = memory.solve(&table, demand + lead).clamp(0.0, GRID as f64);
             memory.apply(&table, drive);
             memory.drive() * (RANGE[1] - RANGE[0]) / GRID as f64
@@ -123,7 +131,7 @@ fn the_feed_forward_leaves_little_of_a_sine_and_no_other_dead_time_leaves_less_a
     let frequencies = [5.0, 20.0, 50.0, 100.0];
     let mut of_dead_time = Vec::new();
     for earlier in [0.05e-3, 0.0, -0.05e-3] {
-        let hysteresis = lowered(&found, earlier);
+        let hysteresis = lowered(&found, RateOption::Creep, earlier);
         for (name, plant) in
             [("with the mode", model(fine, RateOption::CreepMode)), ("without", model(fine, RateOption::EvenCreep))]
         {
@@ -136,9 +144,18 @@ fn the_feed_forward_leaves_little_of_a_sine_and_no_other_dead_time_leaves_less_a
             of_dead_time.push(left);
         }
     }
+    // The proposed model: with the inverse of the mode.
+    let compensated = {
+        let mut plant = model(fine, RateOption::CreepMode).clone();
+        plant.dead_time -= found.report.held;
+        let hysteresis = lowered(&found, RateOption::CreepMode, 0.0);
+        frequencies.map(|frequency| residual(&plant, &hysteresis, frequency))
+    };
+    println!("with the mode compensated: {compensated:.3?} %");
     let [earlier, proposed, later] = [0, 2, 4].map(|k| of_dead_time[k]);
     // Half a period more or less is worse where the dead time matters.
     assert!((2..4).all(|k| proposed[k] < earlier[k] && proposed[k] < later[k]));
+    assert!(compensated[3] < 0.5 * proposed[3], "{compensated:?} {proposed:?}");
     // The slowest is of creep alone: 0.12 % was asked for.
     for (left, bar) in proposed.iter().zip([0.2, 0.2, 0.35, 0.6]) {
         assert!(*left <= bar, "{proposed:?}");

@@ -9,7 +9,7 @@ use specgen::everett::EverettTable;
 use specgen::identify::rate::{
     RateIdentification, RateOption, RateReport, identify_rate, read_rate_csv, spec_lines, write_rate_csv,
 };
-use specgen::identify::{Options, Record};
+use specgen::identify::{Drive, Options, Record, predict};
 
 const DRIVE: [f64; 2] = [0.0, 100.0];
 const GRID: usize = 8;
@@ -234,10 +234,19 @@ fn one_model_for_three_measured_rates() {
         assert!(creep.left_out[k] < 0.5 * plain.left_out[k], "record {k}: {:?}", creep.left_out);
     }
     assert_eq!(found.report.verdict.beats_static, RateOption::ALL[1..]);
-    assert_eq!(found.report.verdict.best, RateOption::Creep);
+    assert_eq!(found.report.verdict.best, RateOption::CreepMode);
     // The mode that rings at the beginning of each record, and creep of one weight: a table and three numbers.
-    let mode = found.report.mode.unwrap();
-    assert!((mode.frequency - 734.5).abs() < 2.0 && (mode.damping - 0.0148).abs() < 5e-4, "{mode:?}");
+    let ring = found.report.ring.unwrap();
+    println!("{ring:?}");
+    let [early, large] = ring.at_first.unwrap();
+    assert!((early - 734.5).abs() < 2.0 && ring.amplitude < 0.5 * large, "{ring:?}");
+    assert!((ring.mode.frequency - 741.0).abs() < 3.0 && (ring.mode.damping - 0.016).abs() < 2e-3, "{ring:?}");
+    let inertia = options[5].inertia.unwrap();
+    assert!((0.023e-6..0.027e-6).contains(&inertia.gain), "{inertia:?}");
+    let Some(wide) = measured("validate-wide-band.csv") else { return };
+    let left = [3, 5].map(|k| predict(&found.models[k].1, &Drive::from(&wide)).unwrap().compared.unwrap().rms_percent);
+    println!("wide band: {left:?}");
+    assert!(left[1] <= 0.7 && left[0] > 2.0, "{left:?}");
     let [even, moved] = [&options[4], &options[5]];
     assert!(moved.fitted.iter().all(|error| *error <= 0.1), "{:?}", moved.fitted);
     assert!(mean(&moved.left_out) < 0.7 * mean(&creep.left_out), "{:?}", moved.left_out);

@@ -26,6 +26,7 @@ mod identify_synthetic;
 mod identify_theorems;
 mod integrity;
 mod kinematics;
+mod leg_resonance;
 mod paper_tables;
 mod physical_lint;
 mod platform_bits;

@@ -15,6 +15,7 @@ use super::normal::{Weighting, accumulate};
 use super::prior;
 use super::record::Record;
 use super::regressor::Plane;
+use super::statistics::{extent, median, noise_floor};
 
 /// Least ratio of the fast to the slow branches (90 % and 10 % quantile of |du/dt|) for an estimate of the dead time.
 const RATE_RATIO: f64 = 2.0;
@@ -26,8 +27,12 @@ const OF_BRANCH: f64 = 0.5;
 const STEPS: usize = 32;
 /// Number of samples used in a search; a longer record is decimated evenly.
 const SAMPLES: usize = 100_000;
-/// The residual must fall by this fraction; otherwise the dead time is zero.
+/// The residual above white noise must fall by this fraction, and by this many standard errors; otherwise the dead time
+/// is zero.
 const WORTHWHILE: f64 = 0.1;
+const CERTAIN: f64 = 5.0;
+/// Loops are nested if half of the rises begin above this share of the drive's range.
+const NESTED: f64 = 0.05;
 
 /// Estimates the dead time between the columns in s, at most 8 ms. The text describes the decision.
 #[must_use]
@@ -39,11 +44,56 @@ pub fn estimate(plane: &Plane, record: &Record, first: usize, branches: &[Branch
         );
         return (0.0, why);
     }
+    if let Some(duration) = one_duration(record, first, branches) {
+        let why = format!(
+            "not identifiable: loops that grow or decay all take {:.3} ms a branch; give it with --dead-time",
+            duration * 1e3
+        );
+        return (0.0, why);
+    }
+    let Some((found, samples)) = best(plane, record, first, branches) else {
+        return (0.0, "not identifiable: the record does not determine the table".to_owned());
+    };
+    // No dead time removes white noise, and a fall within its chance shows none.
+    let noise = noise_floor(&record.displacement[first..]) / record.displacement_range();
+    let white = samples as f64 * noise * noise;
+    let above = |square: f64| if square > white { (square - white).sqrt() } else { 0.0 };
+    let certain = found.none - found.least > CERTAIN * CERTAIN * noise * noise;
+    let gain = if certain { 1.0 - above(found.least) / above(found.none) } else { 0.0 };
+    if found.at_end {
+        let longest = longest(record, branches);
+        return (0.0, format!("not credible: the fit still improves at {} ms", longest * 1e3));
+    }
+    if found.dead_time == 0.0 || gain.is_nan() || gain < WORTHWHILE {
+        return (0.0, format!("none: the best one lowers the residual by less than {:.0} %", WORTHWHILE * 100.0));
+    }
+    (found.dead_time, format!("estimated: lowers the residual of the branches by {:.0} %", gain * 100.0))
+}
+
+/// The common duration of the branches (s) of a record that does not return to its lowest drive between its curves. Its
+/// rate follows the size of the loop, and so does hysteresis: a dead time would be one or the other.
+fn one_duration(record: &Record, first: usize, branches: &[Branch]) -> Option<f64> {
+    let (low, high) = extent(&record.drive[first..]);
+    let (mut starts, mut durations): (Vec<f64>, Vec<f64>) = branches
+        .iter()
+        .filter(|b| b.rising)
+        .map(|b| (record.drive[b.first], record.time[b.end - 1] - record.time[b.first]))
+        .unzip();
+    durations.sort_unstable_by(f64::total_cmp);
+    let at = |share: f64| durations.get((share * durations.len() as f64) as usize).copied();
+    // The first loops may be too small to count as reversals, and merge.
+    let (short, long) = at(0.25).zip(at(0.75))?;
+    (median(&mut starts) > low + NESTED * (high - low) && long < RATE_RATIO * short).then_some(long)
+}
+
+/// The dead time with the least residual, and the samples of the fit; `None` if the record does not determine the table.
+pub(super) fn best(plane: &Plane, record: &Record, first: usize, branches: &[Branch]) -> Option<(SearchResult, usize)> {
     let scale = 1.0 / record.displacement_range();
     let every = (record.time.len() - first).div_ceil(SAMPLES);
     // Beyond this point, a longer dead time would need samples after the end of the record.
     let longest = longest(record, branches);
     let end = within(record, longest);
+    let mut samples = 0;
     let found = search(longest, |tried| {
         let mut shifts: Vec<Shift> = tried.iter().map(|&tau| Shift { tau, next: 0 }).collect();
         let fill = |k: usize, values: &mut [f64]| {
@@ -54,19 +104,10 @@ pub fn estimate(plane: &Plane, record: &Record, first: usize, branches: &[Branch
         let weighting = Weighting::Every(every, end);
         let mut normal = accumulate(plane, record, first, branches, weighting, tried.len(), fill);
         prior::add(plane.grid, &mut normal.gram);
+        samples = normal.samples;
         residuals(&normal.gram, &normal.rhs, &normal.energy)
-    });
-    let Some(found) = found else {
-        return (0.0, "not identifiable: the record does not determine the table".to_owned());
-    };
-    let gain = 1.0 - (found.least / found.none).sqrt();
-    if found.at_end {
-        return (0.0, format!("not credible: the fit still improves at {} ms", longest * 1e3));
-    }
-    if found.dead_time == 0.0 || gain.is_nan() || gain < WORTHWHILE {
-        return (0.0, format!("none: the best one lowers the residual by less than {:.0} %", WORTHWHILE * 100.0));
-    }
-    (found.dead_time, format!("estimated: lowers the residual of the branches by {:.0} %", gain * 100.0))
+    })?;
+    Some((found, samples))
 }
 
 /// Where a search ended.

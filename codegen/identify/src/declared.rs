@@ -8,7 +8,8 @@ use crate::rate::period::{INVERTED, Invertible};
 use crate::rate::{CreepTerm, Inertia, RateModel};
 use crate::{Options, Report, identify, is_simulated, is_table_csv, parse_record, rate, read_file, read_table_csv};
 use specgen_language::diagnostic::{Code, Diagnostic, Place, codes};
-use specgen_language::model::{Model, RateDependence};
+use specgen_language::model::{Hysteresis, Model, RateDependence};
+use specgen_language::spec::LegLines;
 
 /// Largest ratio of a record's displacement to that of stack gain and voltage: creep and a rough data sheet explain
 /// less than this, a wrong unit gives 1000.
@@ -62,16 +63,8 @@ impl SpecRecords {
     #[must_use]
     pub fn leg(&self, model: &Model, leg: usize) -> Option<RateModel> {
         let of = |tables: &[EverettTable]| tables.get(leg).or(tables.first()).cloned();
-        let creep = match &model.hysteresis.rate {
-            RateDependence::Creep(terms) => {
-                terms.iter().map(|&[time_constant, weight]| CreepTerm { time_constant, weight }).collect()
-            }
-            _ => Vec::new(),
-        };
-        let dead_time = model.hysteresis.dead_time;
-        let still = of(&self.tables)?;
-        let inertia = Some(Inertia { mode: mode_of(model), gain: still.mean_gain() });
-        Some(RateModel { still, rate: of(&self.rate_tables), creep, inertia, dead_time })
+        let mode = Some((mode_of(model), model.actuator.resonance_gain));
+        Some(of_tables(&model.hysteresis, of(&self.tables)?, of(&self.rate_tables), mode))
     }
 
     /// Refuses a period so short that most ticks would use the static inverse: that is not the controller in the spec.
@@ -125,6 +118,49 @@ impl SpecRecords {
     }
 }
 
+/// The model of the tables of a leg with the other values of `lines`, and a mode with its share of the mean gain.
+fn of_tables(
+    lines: &Hysteresis,
+    still: EverettTable,
+    rate: Option<EverettTable>,
+    mode: Option<(Mode, Option<f64>)>,
+) -> RateModel {
+    let creep = match &lines.rate {
+        RateDependence::Creep(terms) => {
+            terms.iter().map(|&[time_constant, weight]| CreepTerm { time_constant, weight }).collect()
+        }
+        _ => Vec::new(),
+    };
+    let inertia = mode.map(|(mode, share)| Inertia {
+        mode,
+        gain: share.map_or_else(|| still.reversal_gain(), |share| share * still.mean_gain()),
+    });
+    RateModel { still, rate, creep, inertia, dead_time: lines.dead_time }
+}
+
+/// The model of `leg`, 0 to 5, in the lines of a leg, whose files are relative to `dir`; its records are tables.
+///
+/// # Errors
+/// All findings of a table, or E0642 if the second one has another grid.
+pub fn of_lines((lines, mode, share): &LegLines, dir: &Path, leg: usize) -> Result<RateModel, Vec<Diagnostic>> {
+    let file = |names: &[String]| -> Result<(String, String), Vec<Diagnostic>> {
+        let name = names.get(leg).or(names.first()).cloned().unwrap_or_default();
+        Ok((read_file(&dir.join(&name), &name)?, name))
+    };
+    let (text, name) = file(&lines.records)?;
+    let still = read_table_csv(&text, &name)?;
+    let mut second = None;
+    if let RateDependence::DynamicPreisach(files) = &lines.rate {
+        let (text, name) = file(files)?;
+        let table = rate::read_rate_csv(&text, &name)?;
+        let wanted = (still.grid, [still.drive_min, still.drive_max]);
+        of_grid(wanted, &name, &table, codes::RATE_TABLE_MISMATCH, "hysteresis.rate_tables")?;
+        second = Some(table);
+    }
+    let mode = mode.map(|[frequency, damping]| (Mode { frequency, damping }, *share));
+    Ok(of_tables(lines, still, second, mode))
+}
+
 /// The leg's resonance in the spec.
 fn mode_of(model: &Model) -> Mode {
     Mode { frequency: model.actuator.resonance, damping: model.actuator.damping_ratio }
@@ -156,10 +192,20 @@ fn of_right_scale(model: &Model, name: &str, table: &EverettTable) -> Result<(),
 
 /// Refuses a table whose grid or range differs from the spec's.
 fn fits_spec(model: &Model, name: &str, table: &EverettTable, code: Code, key: &str) -> Result<(), Vec<Diagnostic>> {
-    let [min, max] = model.actuator.voltage;
+    of_grid((model.hysteresis.grid, model.actuator.voltage), name, table, code, key)
+}
+
+/// The same for cells and voltages.
+fn of_grid(
+    (grid, [min, max]): (usize, [f64; 2]),
+    name: &str,
+    table: &EverettTable,
+    code: Code,
+    key: &str,
+) -> Result<(), Vec<Diagnostic>> {
     let slack = 1e-9 * (max - min);
     let fits = (table.drive_min - min).abs() <= slack && (table.drive_max - max).abs() <= slack;
-    if table.grid == model.hysteresis.grid && fits {
+    if table.grid == grid && fits {
         return Ok(());
     }
     Err(vec![about_file(
@@ -168,9 +214,9 @@ fn fits_spec(model: &Model, name: &str, table: &EverettTable, code: Code, key: &
         key,
         format!(
             "the table has {} cells over {} V to {} V; the spec declares {} cells (hysteresis.grid) over {min} V to {max} V (actuator.voltage)",
-            table.grid, table.drive_min, table.drive_max, model.hysteresis.grid
+            table.grid, table.drive_min, table.drive_max, grid
         ),
-        format!("identify the record again with --grid {} --drive {min}:{max}", model.hysteresis.grid),
+        format!("identify the record again with --grid {grid} --drive {min}:{max}"),
     )])
 }
 

@@ -1,7 +1,9 @@
-//! Invalid samples of a record: they get no weight in fits, and a finding states their times.
+//! Invalid samples of a record: they get no weight in fits, and a finding states their times. A glitch is replaced by the
+//! mean of its neighbours, because a fit with a dead time interpolates between samples.
 
 use super::columns::LineNumbers;
 use super::findings::Findings;
+use super::mode::{self, Mode};
 use super::statistics::{extent, median, noise_floor};
 use specgen_language::diagnostic::codes;
 
@@ -16,20 +18,27 @@ const ALONE: f64 = 3.0;
 const NEAR: usize = 2;
 /// A step between two samples by this fraction of the drive's range is a jump: no rate-independent model follows it.
 pub(crate) const JUMP: f64 = 0.1;
-/// Samples without weight after a jump, while the actuator rings.
-pub(crate) const SETTLING: usize = 200;
+/// Time constants after which a hundredth of a ring is left.
+const SETTLED: f64 = 4.6;
+/// Settling time after a jump if nothing is seen to ring, s.
+const SETTLING: f64 = 20e-3;
+
+/// Time without weight after a jump (s), while `mode` rings.
+pub(crate) fn settling(mode: Option<Mode>) -> f64 {
+    mode.map_or(SETTLING, |mode| SETTLED / (core::f64::consts::TAU * mode.frequency * mode.damping))
+}
 
 /// Samples without weight: glitches of the displacement, and those after a jump of the drive.
 pub(crate) fn weightless(
     lines: &LineNumbers,
     time: &[f64],
     drive: &[f64],
-    displacement: &[f64],
+    displacement: &mut [f64],
     findings: &mut Findings,
 ) -> Vec<bool> {
     let mut weightless = vec![false; time.len()];
     glitches(lines, time, drive, displacement, &mut weightless, findings);
-    jumps(lines, time, drive, &mut weightless, findings);
+    jumps(lines, [time, drive, displacement], &mut weightless, findings);
     weightless
 }
 
@@ -37,7 +46,7 @@ fn glitches(
     lines: &LineNumbers,
     time: &[f64],
     drive: &[f64],
-    displacement: &[f64],
+    displacement: &mut [f64],
     weightless: &mut [bool],
     findings: &mut Findings,
 ) {
@@ -63,6 +72,7 @@ fn glitches(
             continue;
         }
         weightless[k] = true;
+        displacement[k] = 0.5 * (displacement[k - 1] + displacement[k + 1]);
         let message = format!(
             "at {} s the displacement is off its neighbours by {:.3} um for a single sample: it gets no weight",
             time[k],
@@ -73,24 +83,33 @@ fn glitches(
     }
 }
 
-fn jumps(lines: &LineNumbers, time: &[f64], drive: &[f64], weightless: &mut [bool], findings: &mut Findings) {
+fn jumps(
+    lines: &LineNumbers,
+    [time, drive, displacement]: [&[f64]; 3],
+    weightless: &mut [bool],
+    findings: &mut Findings,
+) {
     let (low, high) = extent(drive);
     // Further jumps in the settling time belong to the one that was reported.
     let mut reported = 0;
     let is_jump = |k: &usize| (drive[*k] - drive[k - 1]).abs() > JUMP * (high - low);
+    let mut settling_time = None;
     for k in (1..drive.len()).filter(is_jump) {
-        let end = (k + SETTLING).min(drive.len());
+        let ringing = || settling(mode::ring(time, drive, displacement).map(|ring| ring.mode));
+        let until = time[k] + *settling_time.get_or_insert_with(ringing);
+        let end = time.partition_point(|t| *t < until).max(k + 1);
         weightless[k..end].fill(true);
         if k < reported {
             continue;
         }
         reported = end;
         let message = format!(
-            "at {} s the drive jumps from {} V to {} V: {} samples from there get no weight",
+            "at {} s the drive jumps from {} V to {} V: {} samples from there ({:.1} ms) get no weight",
             time[k],
             drive[k - 1],
             drive[k],
-            end - k
+            end - k,
+            1e3 * settling_time.unwrap_or_default()
         );
         let help = "drive by ramps or sines: a jump excites the resonance, which hides the hysteresis";
         findings.add(codes::RECORD_JUMP, Some(lines.at(k)), message, help);

@@ -1,5 +1,8 @@
 //! The Everett table: the result of an identification, which the lowering turns into a constant.
 
+/// Least N at which [`EverettTable::reversal_gain`] is the gain of small motion.
+pub const FINE_GRID: usize = 32;
+
 /// Everett function E(up, down) of one leg on a uniform grid of `grid` intervals, in metres of displacement.
 ///
 /// E(u_i, u_j) is the displacement gained when the drive rises from saturation at `u_j` to `u_i`
@@ -41,6 +44,16 @@ impl EverettTable {
     #[must_use]
     pub fn mean_gain(&self) -> f64 {
         self.node(self.grid, 0) / (self.drive_max - self.drive_min)
+    }
+
+    /// Displacement per volt just after a reversal, m/V: the mean over the diagonal cells.
+    ///
+    /// The gain of small and fast motion, and of the mode. A coarse grid gives too much, because its diagonal cells
+    /// contain hysteresis: use N ≥ [`FINE_GRID`].
+    #[must_use]
+    pub fn reversal_gain(&self) -> f64 {
+        let sum = (1..=self.grid).fold(0.0, |sum, up| sum + self.node(up, up - 1));
+        sum / (self.drive_max - self.drive_min)
     }
 
     /// Preisach weight of the cell between thresholds `up`−1..`up` and `down`..`down`+1, in metres.

@@ -16,7 +16,7 @@ use super::normal::{Normal, Step, Sums, Weighting, walk, weight};
 use super::record::Record;
 use super::regressor::Plane;
 use super::statistics::{extent, mean, mean_and_error};
-use super::{DeadTime, Options, coverage, dead_time, prior, selection};
+use super::{DeadTime, Options, coverage, dead_time, defects, prior, selection};
 use specgen_language::diagnostic::{Diagnostic, codes};
 use specgen_language::interrupt;
 use specgen_numerics::nnls;
@@ -80,6 +80,8 @@ fn choose(record: &Record, drive: [f64; 2], dead_time: DeadTime, findings: &mut 
     if findings.any_error() {
         return None;
     }
+    // `identify` states what is repaired.
+    let record = &defects::repaired(record, drive, PROBE, &mut Findings::new(""));
     // All grids use the finest segmentation that the record allows: they are scored on the same samples.
     let mut used = None;
     for grid in TRIED {

@@ -27,6 +27,7 @@ mod container;
 mod coverage;
 mod dead_time;
 pub mod declared;
+mod defects;
 mod distrust;
 mod estimate;
 pub mod everett;
@@ -151,6 +152,7 @@ fn identify_checked(
     if findings.any_error() {
         return None;
     }
+    let record = &defects::repaired(record, plane.range, plane.grid, findings);
     let mut used = selection::usable(record, &plane, findings)?;
     let (dead_time, dead_time_basis) = match options.dead_time {
         DeadTime::Estimate => dead_time::estimate(&plane, record, used.first, &used.branches),

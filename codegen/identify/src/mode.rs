@@ -93,7 +93,7 @@ impl FreeStep {
 /// A ring of a record while its drive rests.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Ring {
-    /// What rings.
+    /// What rings, at the amplitude of the part used.
     pub mode: Mode,
     /// Time of the first sample used, s.
     pub time: f64,
@@ -101,6 +101,9 @@ pub struct Ring {
     pub amplitude: f64,
     /// Residual of the displacement, rms, m.
     pub left: f64,
+    /// Frequency (Hz) and amplitude (m) at the beginning of the rest, if the part used is a later one: an actuator is
+    /// softer at a larger amplitude.
+    pub at_first: Option<[f64; 2]>,
 }
 
 /// Most samples of a rest that are used, from those after the jump on, and fewest.
@@ -119,6 +122,11 @@ const LEAST_DAMPING: f64 = 1e-3;
 /// Least fraction of the motion in the rest that a ring explains, and least ratio to its residual.
 const EXPLAINED: f64 = 0.8;
 const ABOVE_LEFT: f64 = 5.0;
+/// Part of a ring that is used if it is clear, in periods after the beginning of the rest: its amplitude is nearer to
+/// that of the mode in service, and the creep of the jump is slower.
+const LATE: [f64; 2] = [15.0, 50.0];
+/// Largest relative change of the frequency between the two parts.
+const SAME_MODE: f64 = 0.1;
 /// Number of rests that are tried.
 const RESTS: usize = 4;
 const REFINED: usize = 40;
@@ -152,7 +160,17 @@ fn rests(drive: &[f64], tolerance: f64) -> Vec<(usize, usize)> {
     found
 }
 
+/// The ring of a rest, of its late part if that is clear.
 fn ring_of_rest(time: &[f64], y: &[f64]) -> Option<Ring> {
+    let first = ring_of_part(time, y)?;
+    let [from, to] = LATE.map(|periods| time.partition_point(|t| *t < time[0] + periods / first.mode.frequency));
+    let late = if to - from < FEWEST { None } else { ring_of_part(&time[from..to], &y[from..to]) };
+    let same = |late: &Ring| (late.mode.frequency / first.mode.frequency - 1.0).abs() < SAME_MODE;
+    let at_first = Some([first.mode.frequency, first.amplitude]);
+    Some(late.filter(same).map_or(first, |late| Ring { at_first, ..late }))
+}
+
+fn ring_of_part(time: &[f64], y: &[f64]) -> Option<Ring> {
     let count = if time.len() < LOOKED_AT { time.len() } else { LOOKED_AT };
     let (time, y) = (&time[..count], &y[..count]);
     let duration = time[time.len() - 1] - time[0];
@@ -183,7 +201,13 @@ fn ring_of_rest(time: &[f64], y: &[f64]) -> Option<Ring> {
     let mode = refine(best?.1, 0.125 / duration, |mode| left(mode).map(|found| found.0));
     let (rest, amplitude) = left(mode)?;
     let rings = rest < (1.0 - EXPLAINED) * plain && amplitude > ABOVE_LEFT * rest.sqrt();
-    (rings && mode.damping > LEAST_DAMPING).then_some(Ring { mode, time: time[0], amplitude, left: rest.sqrt() })
+    (rings && mode.damping > LEAST_DAMPING).then_some(Ring {
+        mode,
+        time: time[0],
+        amplitude,
+        left: rest.sqrt(),
+        at_first: None,
+    })
 }
 
 /// The mode near `mode` with the least `left`: steps in both directions, halved if none helps.

@@ -33,7 +33,7 @@ use specgen_language::diagnostic::Diagnostic;
 use super::findings::Findings;
 use super::mode::{self, Mode, Ring};
 use super::record::Record;
-use super::{Options, coverage, sweep};
+use super::{Options, coverage, defects, sweep};
 
 pub use export::{read_rate_csv, spec_lines, write_rate_csv};
 pub use report::{HoldOut, OptionReport, RateRecord, RateReport, Verdict};
@@ -61,12 +61,6 @@ impl RateOption {
     pub const ALL: [Self; 6] =
         [Self::Static, Self::DeadTime, Self::DynamicPreisach, Self::Creep, Self::EvenCreep, Self::CreepMode];
 
-    /// Whether the controller can run it. No controller inverts a mode: that option only predicts.
-    #[must_use]
-    pub const fn runs(self) -> bool {
-        !matches!(self, Self::CreepMode)
-    }
-
     /// Its name in a report.
     #[must_use]
     pub fn name(self) -> &'static str {
@@ -93,7 +87,8 @@ pub struct CreepTerm {
 /// Contribution of a mode to the displacement: its response to `gain` · drive, less gain · drive itself.
 ///
 /// The input is not the displacement of the table: its edges at the nodes would make a lightly damped mode ring, which
-/// the actuator does not.
+/// the actuator does not. Nor is its gain that of the table's loops: near its frequency the drive moves the actuator by
+/// the gain of small motion, [`EverettTable::reversal_gain`].
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct Inertia {
     /// The mode.
@@ -153,12 +148,22 @@ pub fn identify_rate(
     let mut refused = false;
     let mut prepared = Vec::new();
     let mut plane = None;
+    let mut mended = Vec::new();
     for record in records {
         let mut findings = Findings::new(&record.shown_as);
         plane = coverage::plane(options, &mut findings);
         if let Some(plane) = &plane {
-            prepared.extend(prepare::prepare(record, plane, &mut findings));
+            coverage::check_range(record, plane, &mut findings);
         }
+        if let Some(plane) = plane.filter(|_| !findings.any_error()) {
+            mended.push(defects::repaired(record, plane.range, plane.grid, &mut findings));
+        }
+        refused |= findings.any_error();
+        all.extend(findings.into_diagnostics());
+    }
+    for (record, plane) in mended.iter().zip(plane.iter().cycle()) {
+        let mut findings = Findings::new(&record.shown_as);
+        prepared.extend(prepare::prepare(record, plane, &mut findings));
         refused |= findings.any_error();
         all.extend(findings.into_diagnostics());
     }
@@ -169,7 +174,8 @@ pub fn identify_rate(
     if findings.any_error() {
         return Err(findings.into_diagnostics());
     }
-    let mode = clearest_mode(records);
+    let ring = clearest_ring(records);
+    let mode = ring.map(|ring| ring.mode);
     let everything: Vec<usize> = (0..prepared.len()).collect();
     let fitted = fit::all(&plane, &prepared, &everything, mode, &mut findings);
     let mut left_out = Vec::new();
@@ -182,18 +188,17 @@ pub fn identify_rate(
     };
     let longest = models.iter().map(|model| model.dead_time).max_by(f64::total_cmp);
     sweep::check_dead_time(longest.unwrap_or_default(), &mut findings);
-    let report = report::report(&plane, &prepared, &models, &left_out, mode, hold_out)
+    let report = report::report(&plane, &prepared, &models, &left_out, ring, hold_out)
         .map_err(|found| all.into_iter().chain(found).collect::<Vec<_>>())?;
     let models = RateOption::ALL.into_iter().zip(models).collect();
     Ok(RateIdentification { models, report, warnings: findings.into_diagnostics() })
 }
 
-/// The mode of the clearest ring in any of the records.
-fn clearest_mode(records: &[Record]) -> Option<Mode> {
+/// The clearest ring in any of the records.
+fn clearest_ring(records: &[Record]) -> Option<Ring> {
     let clear = |ring: &Ring| ring.amplitude / ring.left;
     records
         .iter()
         .filter_map(|r| mode::ring(&r.time, &r.drive, &r.displacement))
         .reduce(|a, b| if clear(&b) > clear(&a) { b } else { a })
-        .map(|ring| ring.mode)
 }

@@ -33,7 +33,7 @@ pub struct Record {
     pub monitored: bool,
     /// Displacement, m.
     pub displacement: Vec<f64>,
-    /// Samples without weight in fits: glitches, and those after a jump of the drive.
+    /// Samples without weight in fits: glitches, which are replaced, and those after a jump of the drive.
     pub weightless: Vec<bool>,
     /// Whether a comment in the file marks it as simulated.
     pub simulated: bool,
@@ -151,8 +151,8 @@ fn finish(
     if findings.any_error() {
         return Err(findings.into_diagnostics());
     }
-    let [time, drive, displacement] = columns;
-    let weightless = distrust::weightless(lines, &time, &drive, &displacement, &mut findings);
+    let [time, drive, mut displacement] = columns;
+    let weightless = distrust::weightless(lines, &time, &drive, &mut displacement, &mut findings);
     let warnings = findings.into_diagnostics();
     let shown_as = shown_as.to_owned();
     Ok(Record { shown_as, time, drive, monitored: false, displacement, weightless, simulated: false, warnings })

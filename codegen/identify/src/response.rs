@@ -61,13 +61,18 @@ pub struct Band {
 
 /// Coherence below which a bin is left out.
 const COHERENT: f64 = 0.6;
-/// Power of the drive, relative to the strongest bin, below which a bin counts as not excited.
-const EXCITED: f64 = 1e-6;
+/// Power of the drive, relative to the strongest bin, below which a bin is not excited: it has nothing but leakage of
+/// the window. Above it the coherence decides, because noise behind a low-pass is weak at the resonance.
+const EXCITED: f64 = 1e-9;
 /// Least number of bins to fit, and of averages.
 const BINS: usize = 12;
 const AVERAGES: usize = 4;
-/// The resonance is valid if this fraction of the bins from 0.7 to 1.3 times its frequency is used.
+/// The resonance is valid if this fraction of the bins within its half width, or [`NARROW`] bins, is used, and as many
+/// as [`NARROW`] on either side of it.
 const AROUND: f64 = 0.6;
+/// If all bins together do not show a resonance, or fit badly, these multiples of the frequency of the largest response
+/// bound the fit: a drive of large amplitude has hysteresis below, which the model does not have.
+const NEAR: [f64; 2] = [0.6, 1.5];
 /// Largest relative deviation of a sampling interval from the median.
 const UNIFORM: f64 = 0.01;
 /// Fraction of samples at exactly the largest or smallest displacement that shows a limit.
@@ -116,19 +121,32 @@ fn respond_checked(signals: &Signals, segment: Option<usize>, findings: &mut Fin
     let strongest = bins.iter().skip(1).fold(0.0, |m, b| if b.drive_power > m { b.drive_power } else { m });
     let excited = |b: &Bin| b.drive_power > EXCITED * strongest;
     let usable = |b: &Bin| b.frequency > 0.0 && excited(b) && b.coherence >= COHERENT;
-    let used: Vec<Bin> = bins.iter().copied().filter(|b| usable(b)).collect();
+    let mut used: Vec<Bin> = bins.iter().copied().filter(|b| usable(b)).collect();
     let bands = left_out(&bins, &usable, &excited);
     if used.len() < BINS {
         let message = format!("the coherence is below {COHERENT} nearly everywhere: {}", named(&bands));
         return findings.refuse(codes::RESPONSE_COHERENCE, None, message, "drive harder within the linear range, record longer, and check both channels; coherence is lost to noise, to hysteresis at large amplitude and to a wrong channel");
     }
-    let fitted = fit::fit(&used, averages).map_err(|why| {
+    let resolution = rate / segment as f64;
+    let mut whole = fit::fit(&used, averages);
+    let fits = |fitted: &ResonanceFit, used: &[Bin]| {
+        is_shown(fitted, used, resolution) && 100.0 * fit::misfit(fitted, used, averages) <= POOR
+    };
+    if !whole.as_ref().is_ok_and(|fitted| fits(fitted, &used)) {
+        let near = around_peak(&used);
+        let fitted = if near.len() < BINS { None } else { fit::fit(&near, averages).ok() };
+        if let Some(fitted) = fitted.filter(|fitted| fits(fitted, &near)) {
+            (whole, used) = (Ok(fitted), near);
+        }
+    }
+    let fitted = whole.map_err(|why| {
         findings.add(codes::RESPONSE_FIT, None, why, "does the record hold the response from well below to above the resonance, displacement rising with the drive?");
     });
     let fitted = fitted.ok()?;
     let band = [used[0].frequency, used[used.len() - 1].frequency];
-    check_resonance(&fitted, band, &bins, &usable, &bands, findings)?;
-    let resolution = rate / segment as f64;
+    if !is_shown(&fitted, &used, resolution) {
+        return refuse_resonance(&fitted, band, &bands, findings);
+    }
     if 2.0 * fitted.damping_ratio.value * fitted.resonance.value < 3.0 * resolution {
         let message = format!(
             "the resonance is {:.2} Hz wide, a bin {resolution:.2} Hz: the damping ratio comes out too large",
@@ -264,27 +282,33 @@ fn named(bands: &[Band]) -> String {
     format!("{}{more}", each.join(", "))
 }
 
-/// Refuses a resonance without evidence in the record: outside the band, or where the coherence is too low.
-fn check_resonance(
-    fitted: &ResonanceFit,
-    band: [f64; 2],
-    bins: &[Bin],
-    usable: &dyn Fn(&Bin) -> bool,
-    bands: &[Band],
-    findings: &mut Findings,
-) -> Option<()> {
+/// Whether the bins `used`, `resolution` (Hz) apart, show the resonance: its width is covered, and both sides of it.
+fn is_shown(fitted: &ResonanceFit, used: &[Bin], resolution: f64) -> bool {
     let f0 = fitted.resonance.value;
-    let around: Vec<&Bin> = bins.iter().filter(|b| b.frequency >= 0.7 * f0 && b.frequency <= 1.3 * f0).collect();
-    let seen = around.iter().filter(|b| usable(b)).count();
-    if f0 > band[1] || f0 < band[0] || around.is_empty() || (seen as f64) < AROUND * around.len() as f64 {
-        let near: Vec<Band> = bands.iter().copied().filter(|b| b.high >= 0.7 * f0 && b.low <= 1.3 * f0).collect();
-        let gap = if near.is_empty() { String::new() } else { format!("; too low: {}", named(&near)) };
-        let message = format!(
-            "the record does not show the resonance: the fit puts it at {f0:.1} Hz, coherent are {:.1} to {:.1} Hz{gap}",
-            band[0], band[1]
-        );
-        let help = "excite the actuator through its resonance, and record long enough for coherence there";
-        return findings.refuse(codes::RESPONSE_COHERENCE, None, message, help);
-    }
-    Some(())
+    let within = |low: f64, high: f64| used.iter().filter(|b| b.frequency >= low && b.frequency <= high).count();
+    let half = f0 * fitted.damping_ratio.value;
+    let half = if half < NARROW as f64 * resolution { NARROW as f64 * resolution } else { half };
+    let covered = within(f0 - half, f0 + half) as f64;
+    covered >= AROUND * 2.0 * half / resolution && within(0.7 * f0, f0) >= NARROW && within(f0, 1.3 * f0) >= NARROW
+}
+
+/// The bins around the largest response.
+fn around_peak(used: &[Bin]) -> Vec<Bin> {
+    let size = |b: &Bin| libm::hypot(b.h[0], b.h[1]);
+    let peak = used.iter().fold(used[0], |best, b| if size(b) > size(&best) { *b } else { best });
+    let [low, high] = NEAR.map(|multiple| multiple * peak.frequency);
+    used.iter().copied().filter(|b| b.frequency >= low && b.frequency <= high).collect()
+}
+
+/// Refuses a resonance without evidence in the record: outside the band, or where the coherence is too low.
+fn refuse_resonance<T>(fitted: &ResonanceFit, band: [f64; 2], bands: &[Band], findings: &mut Findings) -> Option<T> {
+    let f0 = fitted.resonance.value;
+    let near: Vec<Band> = bands.iter().copied().filter(|b| b.high >= 0.7 * f0 && b.low <= 1.3 * f0).collect();
+    let gap = if near.is_empty() { String::new() } else { format!("; too low: {}", named(&near)) };
+    let message = format!(
+        "the record does not show the resonance: the fit puts it at {f0:.1} Hz, coherent are {:.1} to {:.1} Hz{gap}",
+        band[0], band[1]
+    );
+    let help = "excite the actuator through its resonance, and record long enough for coherence there";
+    findings.refuse(codes::RESPONSE_COHERENCE, None, message, help)
 }

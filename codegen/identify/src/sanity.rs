@@ -137,7 +137,8 @@ fn is_commanded(column: &[f64]) -> bool {
 /// names the part of the record that shows it best.
 fn check_sign(time: &[f64], drive: &[f64], displacement: &[f64], findings: &mut Findings) {
     let correlation = correlation(drive, displacement);
-    if correlation >= 0.5 || correlation.is_nan() {
+    let butterfly = is_butterfly(drive, displacement);
+    if correlation >= 0.5 && !butterfly || correlation.is_nan() {
         return;
     }
     let at = |value: f64| drive.iter().position(|u| *u == value).unwrap_or(0);
@@ -152,12 +153,12 @@ fn check_sign(time: &[f64], drive: &[f64], displacement: &[f64], findings: &mut 
         displacement[a] * 1e6,
         displacement[b] * 1e6
     );
-    if correlation < -0.5 {
+    if correlation < -0.5 && !butterfly {
         let message = format!("the displacement falls when the drive rises (correlation {correlation:.2}): {shown}");
         findings.add(codes::RECORD_RELATION, None, message, "change the sign of one of the two columns");
-    } else if is_butterfly(drive, displacement) {
+    } else if butterfly {
         let message = format!(
-            "the displacement falls and then rises with the drive, a butterfly loop: the drive goes beyond the coercive voltage, where the polarisation turns over; {shown}"
+            "the displacement turns back within the range of the drive, a butterfly loop: the drive goes beyond the coercive voltage, where the polarisation turns over; {shown}"
         );
         let help =
             "record again with a drive that stays on one side of the coercive voltage; a table cannot hold a butterfly";
@@ -176,16 +177,32 @@ fn correlation(drive: &[f64], displacement: &[f64]) -> f64 {
     dot(&u, &y) / (dot(&u, &u) * dot(&y, &y)).sqrt()
 }
 
-/// Whether the displacement falls with the drive on one part of its range and rises on the other.
+/// Parts of the drive's range whose mean displacements show a butterfly, and the least share of their extent on each side
+/// of its turn.
+const PARTS: usize = 24;
+const WING: f64 = 0.1;
+
+/// Whether the mean displacement turns back within the range of the drive, wherever it does.
 fn is_butterfly(drive: &[f64], displacement: &[f64]) -> bool {
     let (low, high) = extent(drive);
-    let middle = 0.5 * (low + high);
-    let side = |upper: bool| {
-        let (u, y): (Vec<f64>, Vec<f64>) =
-            drive.iter().zip(displacement).filter(|(u, _)| (**u > middle) == upper).map(|(u, y)| (*u, *y)).unzip();
-        correlation(&u, &y)
+    let mut sums = [[0.0; 2]; PARTS];
+    for (u, y) in drive.iter().zip(displacement) {
+        // Saturates at the upper end.
+        let part = ((u - low) / (high - low) * PARTS as f64) as usize;
+        let [sum, count] = &mut sums[if part < PARTS { part } else { PARTS - 1 }];
+        *sum += y;
+        *count += 1.0;
+    }
+    let means: Vec<f64> = sums.iter().filter(|[_, count]| *count > 0.0).map(|[sum, count]| sum / count).collect();
+    let ((bottom, top), (least, most)) = (extent(&means), extent(displacement));
+    // Of noise, means are much closer together than samples.
+    let follows = top - bottom > 0.5 * (most - least);
+    let turns_at = |end: f64| {
+        let at = means.iter().position(|mean| *mean == end).unwrap_or(0);
+        let is_wing = |part: &[f64]| part.iter().any(|mean| (mean - end).abs() > WING * (top - bottom));
+        is_wing(&means[..at]) && is_wing(&means[at..])
     };
-    side(true) * side(false) < -0.25
+    follows && (turns_at(bottom) || turns_at(top))
 }
 
 fn check_displacement_unit(time: &[f64], displacement: &[f64], findings: &mut Findings) {

@@ -44,10 +44,43 @@ impl RecordSpan {
     }
 }
 
+/// The start of a record that hardly ever returns to its lowest drive, such as a growing sine: the first sample that
+/// moves. The state there is unknown; `None` if most curves follow a visit to the lowest drive.
+fn unknown_start(record: &Record, plane: &Plane, after_visit: Option<usize>) -> Option<usize> {
+    let found = |first: usize| branches::branches(&record.drive, first, REVERSAL * plane.interval());
+    let all = found(0);
+    let curves = |branches: &[Branch]| falls(branches).len();
+    let most = after_visit.is_some_and(|first| 2 * curves(&found(first)) >= curves(&all));
+    all.first().filter(|_| !most && all.len() > 1).map(|branch| branch.first)
+}
+
+/// Takes the weight of samples at which the drive goes further than ever before, if the state at the start is unknown:
+/// there the record shows cells that were on or off before it. Elsewhere its own extrema have set every cell that
+/// switches.
+pub(crate) fn mask_unknown(record: &mut Record, plane: &Plane, findings: &mut Findings) {
+    let tolerance = AT_MINIMUM * (plane.range[1] - plane.range[0]);
+    let Some(first) = unknown_start(record, plane, branches::first_usable(record, tolerance)) else { return };
+    let (mut low, mut high) = (record.drive[first], record.drive[first]);
+    let mut masked = 0;
+    for (u, weightless) in record.drive[first..].iter().zip(&mut record.weightless[first..]) {
+        if *u <= low || *u >= high {
+            *weightless = true;
+            masked += 1;
+        }
+        (low, high) = (if *u < low { *u } else { low }, if *u > high { *u } else { high });
+    }
+    let message = format!(
+        "starts in an unknown state and hardly returns to its lowest drive: {masked} samples at which the drive goes further than ever before get no weight"
+    );
+    let help = "begin at the lowest drive, and return to it, if you can; decaying loops do";
+    findings.add(codes::RECORD_START, None, message, help);
+}
+
 /// Finds the usable part; refuses a record with too few reversal curves.
 pub(crate) fn usable(record: &Record, plane: &Plane, findings: &mut Findings) -> Option<RecordSpan> {
     let tolerance = AT_MINIMUM * (plane.range[1] - plane.range[0]);
-    let Some(first) = branches::first_usable(record, tolerance) else {
+    let after_visit = branches::first_usable(record, tolerance);
+    let Some(first) = unknown_start(record, plane, after_visit).or(after_visit) else {
         let message = "the drive never rises from its minimum".to_owned();
         let help = format!(
             "start at the lowest drive, then rise to each reversal and fall back; {}",

@@ -250,7 +250,7 @@ pub struct Hysteresis {
     /// Rate dependence; none in a static model.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rate: Option<RateModel>,
-    /// Lead of the demanded leg displacements; none without a dead time.
+    /// Lead of the demanded leg displacements; none without a dead time and a resonance that is compensated.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub lead: Option<Lead>,
 }
@@ -286,6 +286,9 @@ pub enum RateModel {
 pub struct Lead {
     /// Ticks.
     pub ticks: f64,
+    /// Addition over the second difference of the demand; none without `actuator.resonance_gain`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub bend: Option<f64>,
     /// Largest addition, m.
     pub limit: f64,
 }

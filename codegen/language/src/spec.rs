@@ -22,7 +22,8 @@ mod value;
 use findings::Findings;
 
 use crate::diagnostic::{Code, Diagnostic, Severity, codes};
-use crate::model::Model;
+use crate::keys::fields::Value;
+use crate::model::{Hysteresis, Model};
 
 pub use crate::SpecSource;
 pub use crate::quantity;
@@ -93,6 +94,36 @@ pub fn load_as_far(source: &SpecSource) -> (Option<Model>, Vec<Diagnostic>) {
     };
     let model = if findings.all().iter().all(whole) { Model::read(&fields) } else { None };
     (model, findings.finish())
+}
+
+/// `[hysteresis]` of one leg, and of `[actuator]` `resonance` (Hz) with `damping_ratio`, and `resonance_gain`, if they
+/// are there.
+pub type LegLines = (Hysteresis, Option<[f64; 2]>, Option<f64>);
+
+/// Reads a file of these two sections alone, as `specgen identify rate -o` writes one; `None` for a spec.
+///
+/// # Errors
+/// The findings of its lines.
+pub fn leg_lines(source: &SpecSource) -> Option<Result<LegLines, Vec<Diagnostic>>> {
+    let mut findings = Findings::default();
+    let text = source.text.as_str();
+    let parsed = syntax::parse(text, &mut findings);
+    let is_of_leg = |name: &str| name == "hysteresis" || name == "actuator";
+    if text.len() > MAX_BYTES
+        || !parsed.root.contains_key("hysteresis")
+        || !parsed.root.keys().all(|name| is_of_leg(name.get_ref()))
+    {
+        return None;
+    }
+    let fields = read::read(text, &parsed.root, &mut findings);
+    // The other sections, and the rest of the actuator.
+    let absent = |one: &Diagnostic| one.code == codes::MISSING_SECTION || one.code == codes::MISSING_KEY;
+    findings.retain(|one| !absent(one) || one.key.starts_with("hysteresis."));
+    check::of_leg(&fields, &mut findings);
+    let number = |path: &str| <f64 as Value>::read(&fields, path);
+    let mode = number("actuator.resonance").zip(number("actuator.damping_ratio")).map(|(f, zeta)| [f, zeta]);
+    let lines = Hysteresis::read(&fields, "hysteresis").filter(|_| parsed.whole && !findings.has_errors());
+    Some(lines.map(|lines| (lines, mode, number("actuator.resonance_gain"))).ok_or_else(|| findings.finish()))
 }
 
 /// Removes the advice to add quotes if the key takes no text, or if the value is a placeholder.

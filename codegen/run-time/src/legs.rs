@@ -2,7 +2,7 @@
 
 use specgen_ir::scalar::Numbers as _;
 use specgen_ir::{self as ir, Ir};
-use specgen_law::legs::{Lead, LegSpace, SixLegs, State};
+use specgen_law::legs::{Change, Lead, LegSpace, SixLegs, State};
 use specgen_runtime::Real;
 
 use crate::InvalidIr;
@@ -17,10 +17,13 @@ law_constants! {
     /// The constants.
     LegConstants: SixLegs {
         type Lead = Optional<Lead<T, 1>>;
+        type Change = Optional<Change<T, 1>>;
     }
     of (convert, ir: &Ir, asked: Option<&ir::Lead>);
     own led: bool = asked.is_some();
+    own bent: bool = asked.is_some_and(|lead| lead.bend.is_some());
     copy lead: T = convert.real(asked.map_or(0.0, |lead| lead.ticks));
+    copy bend: T = convert.real(asked.and_then(|lead| lead.bend).unwrap_or(0.0));
     copy lead_limit: T = convert.real(asked.map_or(0.0, |lead| lead.limit));
     lend leg_setpoint: [T; 2] = convert.vector(&ir.bounds.leg);
     copy leg_gain: T = convert.real(ir.defaults.leg_gain);
@@ -40,6 +43,7 @@ impl<T: Number> Constants for LegConstants<T> {
     fn complete(&self, state: &mut State<AtRunTime<Self>>) {
         for leg in &mut state.legs {
             leg.lead.given = self.led;
+            leg.change.given = self.bent;
         }
     }
 }

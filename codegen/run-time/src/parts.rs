@@ -3,7 +3,7 @@
 use std::convert::Infallible;
 use std::fmt::Debug;
 
-use specgen_law::legs::{DeadTimeLead, Lead};
+use specgen_law::legs::{Change, DeadTimeLead, LastChange, Lead};
 use specgen_runtime::attitude::horner;
 use specgen_runtime::linear::each;
 use specgen_runtime::setpoint::{Frames, Parallel, Target, Tool, Work};
@@ -129,6 +129,19 @@ impl<T: Real + Debug> DeadTimeLead<T> for Optional<Lead<T, 1>> {
     #[inline]
     fn asked(&self) -> Option<T> {
         if self.given { self.part.asked() } else { None }
+    }
+}
+
+impl<T: Real + Debug> LastChange<T> for Optional<Change<T, 1>> {
+    const REST: Self = Self { given: false, part: Change::REST };
+
+    fn rest(&mut self) {
+        self.part = Change::REST;
+    }
+
+    #[inline]
+    fn bend(&mut self, change: T) -> Option<T> {
+        if self.given { self.part.bend(change) } else { None }
     }
 }
 

@@ -85,9 +85,11 @@ macro_rules! controller {
 
         impl $crate::legs::SixLegs for Constants {
             type Lead = $crate::legs::Lead<Real, { hysteresis::LED as usize }>;
+            type Change = $crate::legs::Change<Real, { hysteresis::BENT as usize }>;
 
             $crate::controller! { @accessors
                 lead -> Real = hysteresis::LEAD;
+                bend -> Real = hysteresis::BEND;
                 lead_limit -> Real = hysteresis::LEAD_LIMIT;
                 leg_setpoint -> &[Real; 2] = &gauges::LEG_SETPOINT;
                 leg_gain -> Real = defaults::LEG_GAIN;

@@ -12,7 +12,7 @@ pub mod waves;
 
 pub use config::Settings;
 pub use constants::{LegSpace, SixLegs};
-pub use lead::{DeadTimeLead, Lead};
+pub use lead::{Change, DeadTimeLead, LastChange, Lead};
 pub use state::{LegState, State};
 pub use step::actuate;
 pub use tick::TickInput;

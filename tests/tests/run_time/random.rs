@@ -172,6 +172,7 @@ fn platform(random: &mut ChaCha8Rng, base: &Compilation) -> Vec<Part> {
 fn legs(random: &mut ChaCha8Rng) -> Vec<Part> {
     vec![
         behind("dead time", 2, "[hysteresis]", format!("dead_time = \"{:.3} ms\"", 0.05 + 0.3 * unit(random))),
+        behind("resonance", 2, "[actuator]", format!("resonance_gain = {:.3}", 0.4 + 0.5 * unit(random))),
         behind("leg set-points", 2, "[controller]", "setpoint = \"leg\""),
     ]
 }
@@ -226,7 +227,7 @@ impl Kinds {
         let expected = "platform, legs, f32, f64, creep, dynamic, run interval, gain ratio, gauge lag, amplifier fault, \
             short arming, rest voltage, no wiring check, legs of different makes, mode, active damping, \
             no notch, hand-over, learning, measured force, modelled force, whole dynamics, tool, work frame, \
-            calibration, triggers, step, path, dead time, leg set-points";
+            calibration, triggers, step, path, dead time, resonance, leg set-points";
         let expected = expected.split(", ").filter(|_| count >= 50);
         let missing: Vec<&str> = expected.filter(|kind| !self.0.contains(*kind)).collect();
         assert!(missing.is_empty(), "not drawn: {missing:?} of {:?}", self.0);

@@ -4,8 +4,8 @@
 //! subcommand is given as `./linear`.
 
 use clap::{Args, Subcommand};
-use specgen_identify::Reading;
 use specgen_identify::mode::Mode;
+use specgen_identify::{DeadTime, Reading};
 use specgen_language::outcome::Failure;
 use specgen_language::ui::Ui;
 use specgen_report::identify::{Bench, estimates, everett, gains, linear, predict, rate};
@@ -59,6 +59,9 @@ struct EverettArguments {
     /// Cells per axis of the Preisach grid; chosen by cross-validation over whole curves if not given.
     #[arg(long, value_name = "N", value_parser = grid, allow_negative_numbers = true)]
     grid: Option<usize>,
+    /// Dead time from the drive column to the displacement, ms; estimated if not given and the record shows it.
+    #[arg(long, value_name = "MS", value_parser = number("", "milliseconds from 0 to 10", 0.0..=10.0), allow_negative_numbers = true)]
+    dead_time: Option<f64>,
     /// A second record of the leg, not used in the fit, to validate the table.
     #[arg(long, value_name = "RECORD")]
     validate: Option<InputFile>,
@@ -137,7 +140,8 @@ struct GaugeArguments {
 #[derive(Args, Debug)]
 #[command(after_help = super::examples::PREDICT)]
 struct PredictArguments {
-    /// A table written by `specgen identify -o`, or a spec (.toml), whose tables, creep, second weight and dead time are used.
+    /// A table written by `specgen identify -o`, or a spec (.toml), whose tables, creep, second weight and dead time are used;
+    /// also the lines of one leg that `identify rate -o` writes.
     #[arg(value_name = "TABLE|SPEC")]
     model: InputFile,
     /// Drive: CSV with time_s and drive_V (the command) or monitor_V (the measured voltage). With displacement_um, the
@@ -289,14 +293,16 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
             rate::run(records, *drive, *grid, hold_out.as_deref(), output.as_deref(), &bench.bench()?, ui)
         }
         None => {
-            let EverettArguments { record, drive, grid, validate, output, bench } = &arguments.everett;
+            let EverettArguments { record, drive, grid, dead_time, validate, output, bench } = &arguments.everett;
             // clap requires both unless there is a subcommand.
             let (Some(record), Some(drive)) = (record, drive) else {
                 return Err(Failure::Usage(
                     "expected a record and --drive, or a command: see `specgen identify --help`".to_owned(),
                 ));
             };
-            everett::run(record, *drive, *grid, validate.as_deref(), output.as_deref(), &bench.bench()?, ui)
+            let dead_time = dead_time.map_or(DeadTime::Estimate, |ms| DeadTime::Fixed(ms * 1e-3));
+            let choices = everett::Choices { drive: *drive, grid: *grid, dead_time };
+            everett::run(record, choices, validate.as_deref(), output.as_deref(), &bench.bench()?, ui)
         }
     }
 }

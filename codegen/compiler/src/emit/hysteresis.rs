@@ -18,11 +18,17 @@ pub fn emit(ir: &Ir) -> TokenStream {
     let lead = ir.task_space.is_none().then(|| {
         let (ticks, limit) = h.lead.as_ref().map_or((0.0, 0.0), |lead| (lead.ticks, lead.limit));
         let (ticks, limit, led) = (literal::real(ir.scalar, ticks), literal::real(ir.scalar, limit), h.lead.is_some());
+        let bend = h.lead.as_ref().and_then(|lead| lead.bend);
+        let (bent, bend) = (bend.is_some(), literal::real(ir.scalar, bend.unwrap_or(0.0)));
         quote! {
-            /// Whether the set-points of the legs lead, to compensate their dead time.
+            /// Whether the set-points of the legs lead, to compensate their dead time and resonance.
             pub const LED: bool = #led;
-            /// Lead of the leg set-points, ticks; from `hysteresis.dead_time`.
+            /// Lead of the leg set-points, ticks; from `hysteresis.dead_time` and `actuator.resonance_gain`.
             pub const LEAD: Real = #ticks;
+            /// Whether the resonance of the legs is compensated.
+            pub const BENT: bool = #bent;
+            /// Addition to a set-point over its second difference; from `actuator.resonance_gain`.
+            pub const BEND: Real = #bend;
             /// Largest lead that is added to a demand, m; from `actuator.slew_rate`.
             pub const LEAD_LIMIT: Real = #limit;
         }
@@ -161,8 +167,11 @@ fn rate_doc(ir: &Ir) -> Vec<&'static str> {
             lines.push(" Γ is the static model with creep behind it; see `specgen_runtime::creep`.");
         }
     }
-    if ir.hysteresis.lead.is_some() {
+    if let Some(lead) = &ir.hysteresis.lead {
         lines.push(" T is led by `LEAD` ticks at its own rate, for the dead time of the legs.");
+        if lead.bend.is_some() {
+            lines.push(" `BEND` times its second difference is added, for their resonance.");
+        }
     }
     if !lines.is_empty() {
         lines.insert(0, "");

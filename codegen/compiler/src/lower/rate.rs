@@ -60,12 +60,22 @@ pub(super) fn lower(
     }
 }
 
-/// The dead time less half a period, because a held voltage corresponds to the middle of its tick. Bounded by the motion of the legs
-/// within it at the amplifier's slew rate, so that jumps of the demand are not extrapolated further.
+/// The dead time less half a period, because a held voltage corresponds to the middle of its tick, and for six legs with
+/// `actuator.resonance_gain` the inverse of the mode: q + k (2ζ/ω q̇ + q̈/ω²), by backward differences. Bounded by the motion of the
+/// legs at the amplifier's slew rate within the dead time and the k/ω of the mode, so that jumps of the demand are not extrapolated
+/// further.
 pub(super) fn lead(model: &Model, scalar: Scalar) -> Option<Lead> {
-    let lead = model.hysteresis.dead_time - 0.5 * model.timing.period;
-    (lead > 0.0).then(|| Lead {
-        ticks: scalar.round(lead / model.timing.period),
-        limit: scalar.round(lead * model.actuator.slew_rate * model.actuator.leg_gain()),
+    let period = model.timing.period;
+    let late = model.hysteresis.dead_time - 0.5 * period;
+    let late = if late > 0.0 { late } else { 0.0 };
+    let gain = model.actuator.resonance_gain.filter(|_| model.task_space.is_none());
+    let omega = core::f64::consts::TAU * model.actuator.resonance;
+    let (lag, reach) =
+        gain.map_or((0.0, 0.0), |gain| (2.0 * gain * model.actuator.damping_ratio / omega, gain / omega));
+    let bend = gain.map(|gain| scalar.round(gain / (omega * period * (omega * period))));
+    (late > 0.0 || bend.is_some()).then(|| Lead {
+        ticks: scalar.round((late + lag) / period),
+        bend,
+        limit: scalar.round((late + reach) * model.actuator.slew_rate * model.actuator.leg_gain()),
     })
 }

@@ -60,9 +60,13 @@ pub fn spec_lines(option: RateOption, model: &RateModel, held: f64, table: &str,
         let ms = shown((model.dead_time - held) * 1e3);
         let _ = writeln!(text, "dead_time = \"{ms} ms\"    # for six legs; with [control] use control.lead");
     }
-    if let Some(Inertia { mode, .. }) = model.inertia {
+    if let Some(Inertia { mode, gain }) = model.inertia {
         let (frequency, damping) = (shown(mode.frequency), shown(mode.damping));
-        let _ = writeln!(text, "[actuator]\nresonance     = \"{frequency} Hz\"\ndamping_ratio = {damping}");
+        let share = shown(gain / model.still.mean_gain());
+        let _ = writeln!(
+            text,
+            "[actuator]\nresonance      = \"{frequency} Hz\"\ndamping_ratio  = {damping}\nresonance_gain = {share}"
+        );
     }
     text
 }

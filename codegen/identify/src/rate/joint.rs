@@ -37,7 +37,7 @@ const PULL: f64 = 1e-4;
 /// Passes in which table and start state converge.
 const PASSES: usize = 2;
 
-/// Weights, gain and dead time of an attempt, their model, and its residual.
+/// Weights and dead time of an attempt, their model, and its residual.
 type Attempt = (Vec<f64>, RateModel, Vec<f64>);
 
 struct Fit<'a> {
@@ -45,8 +45,6 @@ struct Fit<'a> {
     own: Vec<RecordColumns>,
     times: Vec<f64>,
     shape: Shape,
-    /// Mean gain of the table, m/V.
-    gain: f64,
 }
 
 /// Fits `shape` after a table, starting from the table and dead time of `start`.
@@ -54,10 +52,9 @@ pub(super) fn fit(tables: &Tables, start: &RateModel, shape: Shape) -> Result<Ra
     let records = tables.records;
     let times = creep::time_constants(records, shape.even);
     let own = records.iter().map(|p| p.own(&times, shape.mode)).collect();
-    let fit = Fit { tables, own, times, shape, gain: start.still.mean_gain() };
+    let fit = Fit { tables, own, times, shape };
     let weights = if shape.even { 1 } else { fit.times.len() };
     let mut at = vec![0.0; weights];
-    at.extend(shape.mode.map(|_| 1.0));
     at.push(start.dead_time);
     let mut model = fit.table(&at, start)?;
     let mut left = fit.left(&model);
@@ -78,16 +75,15 @@ impl Fit<'_> {
     fn table(&self, at: &[f64], near: &RateModel) -> Result<RateModel, Failure> {
         let (dead_time, weights) = at.split_last().map_or((0.0, at), |(last, weights)| (*last, weights));
         let weight = |k: usize| weights[if self.shape.even { 0 } else { k }];
-        let share = weights.last().copied().unwrap_or(0.0);
-        let inertia = self.shape.mode.map(|mode| Inertia { mode, gain: share * self.gain });
         let terms = self.times.iter().enumerate().map(|(k, tau)| CreepTerm { time_constant: *tau, weight: weight(k) });
         let creep: Vec<CreepTerm> = terms.collect();
         let total = |creep: &[CreepTerm]| creep.iter().fold(1.0, |sum, term| sum + term.weight);
         let mut still = near.still.clone();
         let factor = total(&near.creep) / total(&creep);
         still.nodes.iter_mut().for_each(|node| *node *= factor);
-        let mut model = RateModel { still, rate: None, creep, inertia, dead_time };
+        let mut model = RateModel { still, rate: None, creep, inertia: None, dead_time };
         for pass in 0..PASSES {
+            model.inertia = self.shape.mode.map(|mode| Inertia { mode, gain: model.still.reversal_gain() });
             let target = |(p, own): (&&PreparedRecord, &RecordColumns)| self.target(&model, p, own, pass > 0);
             let targets: Vec<Vec<f64>> = self.tables.records.iter().zip(&self.own).map(target).collect();
             model.still = self.tables.fit(&targets)?;

@@ -7,7 +7,7 @@ use super::start::RecordColumns;
 use super::{Inertia, RateModel, forward};
 use crate::branches;
 use crate::cause::{self, Cause};
-use crate::distrust::{JUMP, SETTLING};
+use crate::distrust::{JUMP, settling};
 use crate::everett::EverettTable;
 use crate::findings::Findings;
 use crate::record::{self, Record};
@@ -144,7 +144,8 @@ pub fn validate(table: &EverettTable, record: &Record, dead_time: f64) -> Result
 ///
 /// The start state is unknown and estimated from the displacement, see [`Prediction::start_on`]. Samples before the
 /// drive first moves are skipped: they have no information on hysteresis. After each jump of the drive by more than 10
-/// % of the table's range in one sampling interval, 200 samples are not compared.
+/// % of the table's range in one sampling interval, samples are not compared until the mode has settled to a hundredth,
+/// or for 20 ms without a mode.
 ///
 /// # Errors
 /// If the drive never moves, or leaves the range of the table by more than 5 %.
@@ -188,7 +189,8 @@ pub fn predict(model: &RateModel, drive: &Drive) -> Result<Prediction, Vec<Diagn
     }
     let parts: Vec<Vec<f64>> = open_weight::parts(&open).iter().map(|part| finish(part)).collect();
     let measured = drive.displacement.as_ref().map(|y| y[first..].to_vec());
-    let settled = settled(&drive.drive, first, JUMP * (top - bottom));
+    let ringing = settling(model.inertia.map(|inertia| inertia.mode));
+    let settled = settled(&drive.time, &drive.drive, first, JUMP * (top - bottom), ringing);
     let keep: Vec<bool> = settled.iter().zip(&drive.weightless[first..]).map(|(s, w)| *s && !w).collect();
     let kept = |values: &[f64]| -> Vec<f64> {
         values.iter().zip(&keep).filter(|(_, keep)| **keep).map(|(value, _)| *value).collect()
@@ -254,7 +256,7 @@ pub fn predict(model: &RateModel, drive: &Drive) -> Result<Prediction, Vec<Diagn
 }
 
 /// `values` at each `time` − `delay` (s), interpolated; the first value before the beginning.
-fn later(time: &[f64], values: &[f64], delay: f64) -> Vec<f64> {
+pub(crate) fn later(time: &[f64], values: &[f64], delay: f64) -> Vec<f64> {
     let mut next = 0;
     let at = |wanted: f64| {
         while next < time.len() && time[next] <= wanted {
@@ -272,15 +274,15 @@ fn later(time: &[f64], values: &[f64], delay: f64) -> Vec<f64> {
     time.iter().map(|t| t - delay).map(at).collect()
 }
 
-/// Whether each sample from `first` on is clear of a step of the drive of more than `jump` (V).
-fn settled(drive: &[f64], first: usize, jump: f64) -> Vec<bool> {
-    let mut until = first;
+/// Whether each sample from `first` on is `settling` (s) clear of a step of the drive of more than `jump` (V).
+fn settled(time: &[f64], drive: &[f64], first: usize, jump: f64, settling: f64) -> Vec<bool> {
+    let mut until = time[first];
     (first..drive.len())
         .map(|k| {
             if k > first && (drive[k] - drive[k - 1]).abs() > jump {
-                until = k + SETTLING;
+                until = time[k] + settling;
             }
-            k >= until
+            time[k] >= until
         })
         .collect()
 }

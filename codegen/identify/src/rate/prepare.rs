@@ -7,7 +7,7 @@ use crate::mode::Mode;
 use crate::record::Record;
 use crate::regressor::Plane;
 use crate::statistics::{median, median_interval};
-use crate::{coverage, dead_time, selection};
+use crate::{dead_time, selection};
 use specgen_language::diagnostic::codes;
 
 /// Least ratio of the records' rates for an estimate of the rate dependence.
@@ -61,10 +61,6 @@ pub(super) fn slope(time: &[f64], drive: &[f64], range: [f64; 2]) -> Vec<f64> {
 
 /// Refuses a record that cannot identify the plane.
 pub(super) fn prepare<'a>(record: &'a Record, plane: &Plane, findings: &mut Findings) -> Option<PreparedRecord<'a>> {
-    coverage::check_range(record, plane, findings);
-    if findings.any_error() {
-        return None;
-    }
     let used = selection::usable(record, plane, findings)?;
     let slope = slope(&record.time, &record.drive, plane.range);
     let mut speeds: Vec<f64> = used.branches.iter().flat_map(|b| &slope[b.first + 1..b.end]).map(|s| s.abs()).collect();

@@ -5,8 +5,8 @@ use serde::Serialize;
 use super::period::Invertible;
 use super::predict::{Drive, predict};
 use super::prepare::PreparedRecord;
-use super::{CreepTerm, RateModel, RateOption, forward};
-use crate::mode::Mode;
+use super::{CreepTerm, Inertia, RateModel, RateOption, forward};
+use crate::mode::Ring;
 use crate::record::Record;
 use crate::regressor::Plane;
 use crate::staircase::Staircase;
@@ -53,6 +53,8 @@ pub struct OptionReport {
     pub dead_time: f64,
     /// Its fitted creep terms; empty for options without creep.
     pub creep: Vec<CreepTerm>,
+    /// The part of the mode; `None` for options without it.
+    pub inertia: Option<Inertia>,
     /// Dynamic Preisach: the shortest period at which a controller can invert it, s. `check` refuses a shorter one.
     pub period: Option<f64>,
     /// Fitted to all records.
@@ -73,7 +75,7 @@ pub struct HoldOut {
 /// Whether an option predicts an unseen rate better than the static table.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Verdict {
-    /// Of the options that a controller can run, the one with the lowest mean error on unseen rates.
+    /// The option with the lowest mean error on unseen rates.
     pub best: RateOption,
     /// Options that are better than the static table on every such rate, and on the held-out record if there is one.
     pub beats_static: Vec<RateOption>,
@@ -91,8 +93,8 @@ pub struct RateReport {
     /// Part of each dead time that is the hold of the records' commands, s: half a sampling interval, averaged over the
     /// records.
     pub held: f64,
-    /// The mode behind the last option, from a ring in a record.
-    pub mode: Option<Mode>,
+    /// The ring that shows the mode of the last option.
+    pub ring: Option<Ring>,
     /// The record held out.
     pub hold_out: Option<HoldOut>,
     /// The options, plainest first.
@@ -107,7 +109,7 @@ pub(super) fn report(
     prepared: &[PreparedRecord],
     models: &[RateModel],
     left_out: &[Vec<RateModel>],
-    mode: Option<Mode>,
+    ring: Option<Ring>,
     hold_out: Option<&Record>,
 ) -> Result<RateReport, Vec<Diagnostic>> {
     let held_out = |model: &RateModel| -> Result<Option<f64>, Vec<Diagnostic>> {
@@ -124,6 +126,7 @@ pub(super) fn report(
             option,
             dead_time: model.dead_time,
             creep: model.creep.clone(),
+            inertia: model.inertia,
             period: model.rate.as_ref().map(|rate| Invertible::of(&model.still, rate).period()),
             fitted: prepared.iter().map(|p| error_on(model, plane, p)).collect(),
             left_out: prepared.iter().zip(left_out).map(|(p, fits)| error_on(&fits[k], plane, p)).collect(),
@@ -134,7 +137,7 @@ pub(super) fn report(
     let verdict = verdict(&records, &options, hold_out);
     let hold_out = hold_out.map(|record| HoldOut { record: record.shown_as.clone() });
     let held = mean(&prepared.iter().map(|p| p.record.held()).collect::<Vec<_>>());
-    Ok(RateReport { grid: plane.grid, records, held, mode, hold_out, options, verdict })
+    Ok(RateReport { grid: plane.grid, records, held, ring, hold_out, options, verdict })
 }
 
 fn figures_of(p: &PreparedRecord) -> RateRecord {
@@ -157,7 +160,7 @@ fn verdict(records: &[RateRecord], options: &[OptionReport], hold_out: Option<&R
     let mut beats_static = Vec::new();
     let mut lines = Vec::new();
     for option in &options[1..] {
-        if option.option.runs() && mean(&option.left_out) < mean(&best.left_out) {
+        if mean(&option.left_out) < mean(&best.left_out) {
             best = option;
         }
         let is_better = |ours: f64, theirs: f64| ours < theirs * (1.0 - BEATS);

@@ -232,6 +232,9 @@ codes! {
     RECORD_GLITCH = "W0517";
     RECORD_JUMP = "W0518";
     RECORD_LONG = "W0519";
+    RECORD_STEP = "W0520";
+    RECORD_HUM = "W0521";
+    RECORD_START = "W0522";
 
     // Identification.
     GRID_NOT_IDENTIFIABLE = "E0601";

@@ -40,6 +40,8 @@ section! {
         resonance: f64 = one(Dimension::FREQUENCY, Range::closed(0.1, 1e7), "Hz"), Required, "" ["f_0", "f_r", "natural_frequency", "eigenfrequency", "resonant_frequency", "resonance_frequency"], "870 Hz";
         /// Damping ratio of that resonance.
         damping_ratio: f64 = number(Range::open(0.0, 1.0)), Required, "zeta" ["damping"], 0.1;
+        /// Gain of that resonance as a fraction of the gain of a large loop: small and fast motion has less, because it stays within the hysteresis. Six legs with their own gauges then compensate the resonance in their demand; with [control] only `specgen identify predict` uses it.
+        resonance_gain: Option<f64> = number(Range::above(0.0, 1.0)), Rule("the slope of the table after a reversal, in predictions; no compensation"), "" ["small_signal_gain", "k_s"], 0.66;
         /// Capacitance of all stacks of a leg together; used for the amplifier's current.
         capacitance: Option<f64> = one(Dimension::CAPACITANCE, Range::above(0.0, 1.0), "uF"), Optional, "" ["C", "C_p"], "35 uF";
     }

@@ -88,6 +88,13 @@ pub(super) fn all(fields: &Fields, dir: &Path, findings: &mut Findings) {
     let _ = records::readable(fields, dir, findings);
 }
 
+/// The checks of the lines of one leg.
+pub(super) fn of_leg(fields: &Fields, findings: &mut Findings) {
+    for check in [rate::keys_of_option as Check, rate::creep_lists] {
+        let _ = check(fields, findings);
+    }
+}
+
 /// Reports [`codes::WRONG_ORDER`] unless the first value of `path` is below the second, or equal if that is permitted.
 fn in_order(fields: &Fields, findings: &mut Findings, path: &str, equal_allowed: bool) -> Option<()> {
     let [low, high] = fields.list::<2>(path)?;

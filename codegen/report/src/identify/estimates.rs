@@ -110,12 +110,14 @@ impl Outcome for IdentificationResult<Estimate<FrequencyResponse>> {
             f.gain.value * 1e6,
             f.gain.error * 1e6,
         );
+        // The lag attenuates what the resonance responds to.
+        let lagging = std::f64::consts::TAU * f.resonance.value * f.lag.value;
         let _ = write!(
             text,
-            "spec lines:\n[actuator]\nresonance = \"{:.1} Hz\"  # static gain here: {:.5} um/V for small amplitude, below that of a large loop\ndamping_ratio = {:.4}\n[amplifier]\nlag = \"{:.4} ms\"\n{}with [control], [actuator] applies to every leg; for this leg alone, write instead:\n{}{files}",
+            "spec lines:\n[actuator]\nresonance = \"{:.1} Hz\"\ndamping_ratio = {:.4}\n# resonance_gain: {:.5} um/V, the gain of small motion behind the lag, over that of a large loop\n[amplifier]\nlag = \"{:.4} ms\"\n{}with [control], [actuator] applies to every leg; for this leg alone, write instead:\n{}{files}",
             f.resonance.value,
-            f.gain.value * 1e6,
             f.damping_ratio.value,
+            f.gain.value * 1e6 / (1.0 + lagging * lagging).sqrt(),
             f.lag.value * 1e3,
             measured.text(),
             mode_lines(f.resonance.value, f.damping_ratio.value),

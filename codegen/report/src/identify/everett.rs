@@ -16,14 +16,24 @@ use specgen_language::output::write_file;
 use specgen_language::table::{right, row};
 use specgen_language::ui::Ui;
 
+/// What the user chooses.
+#[derive(Debug, Clone, Copy)]
+pub struct Choices {
+    /// Range of the table, V.
+    pub drive: [f64; 2],
+    /// Intervals per axis; by cross-validation if not given.
+    pub grid: Option<usize>,
+    /// Of the record.
+    pub dead_time: DeadTime,
+}
+
 /// Reads the record, identifies, writes the requested files and shows the result.
 ///
 /// # Errors
 /// A file cannot be read or written, or its data are unsuitable.
 pub fn run(
     path: &Path,
-    drive: [f64; 2],
-    grid: Option<usize>,
+    Choices { drive, grid, dead_time }: Choices,
     validation: Option<&Path>,
     output: Option<&Path>,
     bench: &Bench,
@@ -34,10 +44,11 @@ pub fn run(
     let record = identify::read_record(path, &shown, reading).map_err(refused)?;
     let choice = match grid {
         Some(_) => None,
-        None => Some(identify::choose_grid(&record, drive, DeadTime::Estimate).map_err(refused)?),
+        None => Some(identify::choose_grid(&record, drive, dead_time).map_err(refused)?),
     };
     let grid = grid.or(choice.as_ref().map(|c| c.chosen)).unwrap_or_default();
-    let identified = identify::identify(&record, &identify::Options::new(grid, drive)).map_err(refused)?;
+    let options = identify::Options { dead_time, ..identify::Options::new(grid, drive) };
+    let identified = identify::identify(&record, &options).map_err(refused)?;
     ui.findings(None, &identified.warnings);
     let validation = match validation {
         Some(path) => Some(validate(path, &identified, reading).map_err(refused)?),

@@ -1,4 +1,4 @@
-//! `specgen identify predict`: predicts the displacement for a drive from a table or a spec, and compares it with a measured one if available.
+//! `specgen identify predict`: predicts the displacement for a drive from a table, the lines of a leg or a spec, and compares it with a measured one if available.
 
 use crate::drawing::wrote;
 use std::fmt::Write as _;
@@ -11,14 +11,15 @@ use specgen_compiler::spec_file;
 use specgen_identify::mode::{self, Mode};
 use specgen_identify::rate::{Inertia, RateModel};
 use specgen_identify::{Drive, Input, Prediction, declared, predict, read_drive, read_file, read_table_csv};
-use specgen_language::outcome::{Failure, Outcome};
+use specgen_language::outcome::{Failure, Outcome, Refusal};
 use specgen_language::output::write_file;
+use specgen_language::spec::{SpecSource, leg_lines};
 use specgen_language::ui::Ui;
 
 /// Options of `predict`.
 #[derive(Debug)]
 pub struct Options {
-    /// A table or a spec.
+    /// A table, the lines of a leg, or a spec.
     pub model: PathBuf,
     /// The drive, and the measured displacement if any.
     pub drive: PathBuf,
@@ -35,12 +36,13 @@ pub struct Options {
 /// The contribution of a mode: the given one, else the model's, else one fitted to ringing in the record.
 fn inertia(options: &Options, model: &RateModel, drive: &Drive) -> Option<Inertia> {
     let ring = || mode::ring(&drive.time, &drive.drive, drive.displacement.as_ref()?).map(|ring| ring.mode);
+    let gain = model.inertia.map_or_else(|| model.still.reversal_gain(), |own| own.gain);
     let found = match (options.mode, model.inertia) {
         (Some(mode), _) => mode,
         (None, Some(own)) => Some(own.mode),
         (None, None) => ring(),
     };
-    found.map(|mode| Inertia { mode, gain: model.still.mean_gain() })
+    found.map(|mode| Inertia { mode, gain })
 }
 
 /// Reads the files, predicts, writes the requested files and shows the result.
@@ -66,8 +68,13 @@ pub fn run(options: &Options, bench: &Bench, ui: &mut Ui) -> Result<(), Failure>
 
 fn model(path: &Path, leg: usize, ui: &mut Ui) -> Result<RateModel, Failure> {
     if path.extension().is_some_and(|extension| extension == "toml") {
-        let model = spec_file::model(path)?;
         let dir = path.parent().unwrap_or(Path::new(""));
+        let source = SpecSource::read(path).map_err(|finding| Refusal { source: None, findings: vec![finding] })?;
+        if let Some(lines) = leg_lines(&source) {
+            let lines = lines.map_err(|findings| Refusal { source: Some(source), findings })?;
+            return declared::of_lines(&lines, dir, leg).map_err(refused);
+        }
+        let model = spec_file::model(path)?;
         let declared = declared::records(&model, dir).map_err(refused)?;
         ui.findings(None, &declared.warnings);
         return declared
@@ -128,8 +135,9 @@ impl Outcome for IdentificationResult<Prediction> {
             report.samples_skipped
         );
         if let Some(inertia) = report.inertia {
+            let Inertia { mode: Mode { frequency, damping }, gain } = inertia;
             let _ =
-                write!(text, "\n  mode at {:.1} Hz, damping ratio {:.4}", inertia.mode.frequency, inertia.mode.damping);
+                write!(text, "\n  mode at {frequency:.1} Hz, damping ratio {damping:.4}, gain {:.5} µm/V", gain * 1e6);
         }
         if report.compared.is_none() && report.samples_clipped > 0 {
             let _ = write!(text, "; {} samples clamped to the table's range", report.samples_clipped);

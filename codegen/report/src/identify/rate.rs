@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use super::{Bench, IdentificationResult, MeasuredKeys, refused};
 use crate::identification as figure;
+use specgen_identify::everett::FINE_GRID;
 use specgen_identify::rate::{RateIdentification, RateOption, RateReport, identify_rate, spec_lines, write_rate_csv};
 use specgen_identify::{marked_as_simulated, read_record, write_table_csv};
 use specgen_language::outcome::{Failure, Outcome};
@@ -71,9 +72,9 @@ fn is_simulated(report: &RateReport) -> bool {
 
 /// The spec keys of the best option.
 fn keys(report: &RateReport) -> Vec<&'static str> {
-    let of_mode = ["actuator.resonance", "actuator.damping_ratio"];
+    let of_mode = ["actuator.resonance", "actuator.damping_ratio", "actuator.resonance_gain"];
     let own = ["hysteresis.grid", "hysteresis.records", "hysteresis.rate", "hysteresis.dead_time"];
-    own.into_iter().chain(report.mode.iter().flat_map(|_| of_mode)).collect()
+    own.into_iter().chain(report.ring.iter().flat_map(|_| of_mode)).collect()
 }
 
 /// Writes the tables, then the spec lines that refer to them.
@@ -106,12 +107,7 @@ fn write(output: &Path, identified: &RateIdentification) -> Result<Vec<PathBuf>,
         }
         let block = spec_lines(*option, model, identified.report.held, &table, &rate_table);
         let prefix = if *option == best { "" } else { "# " };
-        let only = if option.runs() {
-            ""
-        } else {
-            ": for `specgen identify predict`; the controller does not compensate the mode"
-        };
-        let _ = writeln!(lines, "\n# {}{only}", option.name());
+        let _ = writeln!(lines, "\n# {}", option.name());
         for line in block.lines() {
             let _ = writeln!(lines, "{prefix}{line}");
         }
@@ -181,8 +177,25 @@ fn table(report: &RateReport) -> String {
         };
         let _ = writeln!(text, "{}: invertible by a controller {when}", option.name());
     }
-    if let Some(mode) = report.mode {
-        let _ = writeln!(text, "mode: {:.1} Hz, damping ratio {:.4}", mode.frequency, mode.damping);
+    if let Some(ring) = report.ring {
+        let gain = report.options.iter().find_map(|option| option.inertia).map_or(0.0, |inertia| inertia.gain);
+        let coarse = if report.grid < FINE_GRID { "; too large on this coarse grid" } else { "" };
+        let _ = writeln!(
+            text,
+            "mode: {:.1} Hz, damping ratio {:.4}, gain {:.5} µm/V (slope after a reversal{coarse})",
+            ring.mode.frequency,
+            ring.mode.damping,
+            gain * 1e6
+        );
+        if let Some([frequency, amplitude]) = ring.at_first {
+            let _ = writeln!(
+                text,
+                "its frequency by amplitude: {frequency:.1} Hz at {:.3} µm, {:.1} Hz at {:.3} µm",
+                amplitude * 1e6,
+                ring.mode.frequency,
+                ring.amplitude * 1e6
+            );
+        }
     }
     if report.held > 0.0 {
         let _ = writeln!(

@@ -1,6 +1,6 @@
 //! Constants of six legs that the law needs.
 
-use super::lead::DeadTimeLead;
+use super::lead::{DeadTimeLead, LastChange};
 use crate::spec::Spec;
 
 /// The law of six legs with their own gauges.
@@ -11,9 +11,13 @@ pub struct LegSpace;
 pub trait SixLegs: Spec<Law = LegSpace> {
     /// Lead that compensates a leg's dead time, or none.
     type Lead: DeadTimeLead<Self::Real>;
+    /// Last change of a leg's demand, for the compensation of its resonance; or nothing.
+    type Change: LastChange<Self::Real>;
 
     /// Lead of the leg displacements, ticks.
     fn lead(&self) -> Self::Real;
+    /// Addition to the demand over its second difference, for the resonance.
+    fn bend(&self) -> Self::Real;
     /// Largest lead, m.
     fn lead_limit(&self) -> Self::Real;
     /// Lowest and highest permitted set-point of a leg, m.

@@ -1,4 +1,4 @@
-//! Lead of a leg that compensates its dead time.
+//! Lead of a leg that compensates its dead time and its resonance.
 
 use core::fmt::Debug;
 
@@ -24,6 +24,38 @@ specgen_runtime::state! { |words|
     pub struct Lead<T, N>[T: Real, const N: usize] {
         /// m.
         asked: [T; N] = [T::ZERO; N], numbers(words.sizes().leg);
+    }
+}
+
+/// The change of a leg's demand in the last tick, for its second difference; or nothing.
+pub trait LastChange<T: Real>: Copy + Debug + Snapshot {
+    /// No change.
+    const REST: Self;
+    /// Forgets the change.
+    #[inline(always)]
+    fn rest(&mut self) {
+        *self = Self::REST;
+    }
+    /// The second difference of the demand, m, which changes by `change` (m) in this tick.
+    fn bend(&mut self, change: T) -> Option<T>;
+}
+
+specgen_runtime::state! { |words|
+    /// The last change of one leg, or of none: `N` is 1 or 0.
+    pub struct Change<T, N>[T: Real, const N: usize] {
+        /// m.
+        last: [T; N] = [T::ZERO; N], numbers(words.sizes().leg);
+    }
+}
+
+impl<T: Real + Debug, const N: usize> LastChange<T> for Change<T, N> {
+    const REST: Self = Self::new();
+    #[inline(always)]
+    fn bend(&mut self, change: T) -> Option<T> {
+        let last = self.last.first_mut()?;
+        let bend = change - *last;
+        *last = change;
+        Some(bend)
     }
 }
 

@@ -4,7 +4,7 @@ use specgen_runtime::snapshot::Snapshot;
 use specgen_runtime::{Digest, Estimate, Real as _};
 
 use super::constants::SixLegs;
-use super::lead::DeadTimeLead as _;
+use super::lead::{DeadTimeLead as _, LastChange as _};
 use crate::memory::LegMemory as _;
 use crate::spec::{LEGS, Reset};
 
@@ -17,8 +17,11 @@ specgen_runtime::state! { |words|
         pub code: i32 = reset.code, ticks(words.sizes().codes[1]) if *code >= words.sizes().codes[0];
         /// δ̂ and φ̂, m.
         pub estimate: Estimate<P::Real> = Estimate::new(), part;
-        /// Lead on the demand that compensates the dead time, m; none without `hysteresis.dead_time`.
+        /// Lead on the demand that compensates dead time and resonance, m; none without `hysteresis.dead_time` and
+        /// `actuator.resonance_gain`.
         pub lead: P::Lead = P::Lead::REST, part;
+        /// Last change of the demand, m; none without `actuator.resonance_gain`.
+        pub change: P::Change = P::Change::REST, part;
     }
 }
 
@@ -38,8 +41,8 @@ specgen_runtime::state! { |words|
 }
 
 impl<P: SixLegs> LegState<P> {
-    /// ρ̂X, m: the displacement that the gauge should show. It does not include the lead, which only compensates the
-    /// dead time.
+    /// ρ̂X, m: the displacement that the gauge should show. It does not include the lead, which only compensates
+    /// dead time and resonance.
     #[inline]
     #[must_use]
     pub fn shown(&self) -> P::Real {

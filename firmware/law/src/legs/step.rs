@@ -10,7 +10,7 @@ use specgen_runtime::supervisor::Fallback;
 use specgen_runtime::{Law, SetpointKind};
 
 use super::constants::SixLegs;
-use super::lead::DeadTimeLead as _;
+use super::lead::{DeadTimeLead as _, LastChange as _};
 use super::state::{LegState, State};
 use super::tick::TickInput;
 use crate::kinematics::leg_displacements;
@@ -35,8 +35,15 @@ pub fn advance<P: SixLegs>(
         if config.law == Law::Invhys || (run_ends && (faults >> index) & 1 == 0) {
             adapt(config, leg, fallback, input.displacement[index]);
         }
-        leg.lead
-            .ask(|| saturate((state.demand[index] - demand_before[index]) * p.lead(), -p.lead_limit(), p.lead_limit()));
+        let change = state.demand[index] - demand_before[index];
+        let bend = leg.change.bend(change);
+        leg.lead.ask(|| {
+            let lead = match bend {
+                Some(bend) => change * p.lead() + bend * p.bend(),
+                None => change * p.lead(),
+            };
+            saturate(lead, -p.lead_limit(), p.lead_limit())
+        });
         let limited = actuate(p, config, leg, table, state.demand[index]);
         status |= (limited as u32) << index | (leg.memory.fell_back() as u32) << (24 + index);
     }

@@ -7,7 +7,7 @@ use specgen_runtime::{Estimate, Law, Real as _, SetpointKind};
 
 use super::config::Settings;
 use super::constants::{LegSpace, SixLegs};
-use super::lead::DeadTimeLead as _;
+use super::lead::{DeadTimeLead as _, LastChange as _};
 use super::state::{LegState, State};
 use super::step::{advance, is_accepted};
 use super::tick::{TickInput, write_output};
@@ -71,6 +71,7 @@ impl<P: SixLegs> ControlLaw<P> for LegSpace {
             *demand = if adapts { *reading } else { modelled };
             leg.estimate = Estimate { level: *demand - modelled, drift: P::Real::ZERO };
             leg.lead.rest();
+            leg.change.rest();
         }
         supervisor.fresh = false;
         supervisor.approach.begin(match config.setpoint {
@@ -95,6 +96,7 @@ impl<P: SixLegs> ControlLaw<P> for LegSpace {
     fn hold(p: P, _config: &Config<P>, machine: &mut Machine<P>, input: &TickInput<P>) -> u32 {
         for leg in &mut machine.state.legs {
             leg.lead.rest();
+            leg.change.rest();
         }
         faults(&input.displacement, p.raw_limits())
     }

@@ -16,11 +16,17 @@ pub const NODES: usize = (GRID + 1) * (GRID + 2) / 2;
 /// Capacity of the reversal memory, extrema; from `hysteresis.memory`.
 pub const MEMORY: usize = 16;
 
-/// Whether the set-points of the legs lead, to compensate their dead time.
+/// Whether the set-points of the legs lead, to compensate their dead time and resonance.
 pub const LED: bool = false;
 
-/// Lead of the leg set-points, ticks; from `hysteresis.dead_time`.
+/// Lead of the leg set-points, ticks; from `hysteresis.dead_time` and `actuator.resonance_gain`.
 pub const LEAD: Real = 0.0;
+
+/// Whether the resonance of the legs is compensated.
+pub const BENT: bool = false;
+
+/// Addition to a set-point over its second difference; from `actuator.resonance_gain`.
+pub const BEND: Real = 0.0;
 
 /// Largest lead that is added to a demand, m; from `actuator.slew_rate`.
 pub const LEAD_LIMIT: Real = 0.0;

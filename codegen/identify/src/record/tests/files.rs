@@ -253,10 +253,14 @@ fn damaged_files_of_matlab_hdf5_and_tdms_are_answered() {
 /// A butterfly loop, and a gauge in the column of the drive, are called what they are.
 #[test]
 fn loops_that_no_table_holds_are_named() {
-    let butterfly =
-        file("time_s,drive_V,displacement_um", |[t, u, _]| format!("{t},{u},{}", 0.1 * (u - 30.0).abs() + 1e-3 * u));
-    let found = read(butterfly.as_bytes(), &[], None).unwrap_err();
-    assert!(found[0].code == "E0514" && found[0].message.contains("butterfly"), "{found:?}");
+    // Wherever it turns, and with a gauge of either sign.
+    for (turn, gain) in [(30.0, 0.1), (15.0, 0.1), (45.0, 0.1), (20.0, -0.1)] {
+        let butterfly = file("time_s,drive_V,displacement_um", |[t, u, _]| {
+            format!("{t},{u},{}", gain * (u - turn).abs() + 1e-3 * u)
+        });
+        let found = read(butterfly.as_bytes(), &[], None).unwrap_err();
+        assert!(found[0].code == "E0514" && found[0].message.contains("butterfly"), "{found:?}");
+    }
 }
 
 /// Rows cost their numbers, not their text; a line without end is not waited for.
