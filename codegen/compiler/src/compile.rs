@@ -15,6 +15,7 @@ use crate::rest::{self, RestNoise};
 use crate::stability::platform::{Design, RestDynamics};
 use crate::stability::{self, Margins};
 use crate::{requirements, workspace};
+use specgen_identify::leg_model::strokes;
 use specgen_identify::{self as identify, declared};
 use specgen_language::diagnostic::{Diagnostic, Severity};
 use specgen_language::model::Model;
@@ -100,14 +101,16 @@ fn phases(source: &SpecSource, findings: &mut Vec<Diagnostic>) -> Option<Compila
     findings.extend(design.iter().flat_map(|design| design.findings.clone()));
     findings.extend(setpoints.warnings);
 
-    let demand = accepted(demand::check(&model, setpoints.setpoints.as_ref(), &records.tables), findings)?;
+    let strokes = strokes(&records.tables, &records.around);
+    let demand = accepted(demand::check(&model, setpoints.setpoints.as_ref(), &strokes), findings)?;
     findings.extend(demand.warnings);
 
     let digest = lower::digest(&source.text, records.texts.iter().chain(&setpoints.texts));
     let task = design.as_ref().zip(setpoints.setpoints);
     let assumptions = Assumptions::of(&model, records.simulated);
     let origin = Origin { digest: &digest, assumed: assumptions.list() };
-    let ir = accepted(lower::lower(&model, task, &records.tables, &records.rate_tables, origin), findings)?;
+    let ir =
+        accepted(lower::lower(&model, task, &records.tables, &records.rate_tables, &records.around, origin), findings)?;
     let pose_noise = accepted(lower::pose_noise(&model), findings)?;
     let rest_noise = accepted(rest::noise(&model, design.as_ref()), findings)?;
     // Includes the program of the spec's board, if it has one.

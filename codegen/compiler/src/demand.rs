@@ -7,7 +7,6 @@ use crate::lint::{self, paths::PathDemand};
 use crate::lower::setpoint::{self, Stopping};
 use crate::lower::{platform, stroke};
 use crate::reach::{self, Reach};
-use specgen_identify::everett::EverettTable;
 use specgen_language::diagnostic::{Diagnostic, Severity};
 use specgen_language::model::{Model, TaskSpace};
 
@@ -29,8 +28,8 @@ pub struct Demand {
 ///
 /// # Errors
 /// All findings about what is out of reach or too fast.
-pub fn check(model: &Model, setpoints: Option<&Setpoints>, tables: &[EverettTable]) -> Result<Demand, Vec<Diagnostic>> {
-    let stroke = stroke(model, tables);
+pub fn check(model: &Model, setpoints: Option<&Setpoints>, strokes: &[f64]) -> Result<Demand, Vec<Diagnostic>> {
+    let stroke = stroke(model, strokes);
     match (&model.task_space, setpoints) {
         (Some(task), Some(setpoints)) => of_platform(model, task, &platform(model)?, setpoints, stroke),
         _ => of_legs(model, stroke),

@@ -30,6 +30,7 @@ use crate::ir::{
 };
 use crate::stability::platform::{Design, RestDynamics, start_law};
 use specgen_identify::everett::EverettTable;
+use specgen_identify::leg_model::{Around, strokes};
 use specgen_language::diagnostic::Diagnostic;
 use specgen_language::model::{self, Model};
 use specgen_numerics::leg_forces;
@@ -51,7 +52,7 @@ pub struct Origin<'a> {
 ///
 /// `task` is the tuning of a controller in task space and its set-points ([`setpoint::lower`]), none for six legs with their own
 /// gauges; `tables` holds one Everett table for all legs or one for each, `rate_tables` those of the second weight of (6), if the
-/// spec names any. `origin` does not change the law.
+/// spec names any, `around` what is around each of `tables`. `origin` does not change the law.
 ///
 /// # Errors
 /// Findings about values that cannot be turned into a controller (a converter too coarse
@@ -61,10 +62,11 @@ pub fn lower(
     task: Option<(&Design, Setpoints)>,
     tables: &[EverettTable],
     rate_tables: &[EverettTable],
+    around: &[Option<Around>],
     origin: Origin<'_>,
 ) -> Result<Ir, Vec<Diagnostic>> {
     let scalar = scalar(model);
-    let hysteresis = hysteresis(model, tables, rate_tables, scalar);
+    let hysteresis = hysteresis(model, tables, rate_tables, around, scalar);
     let (actuation, max_step) = actuation::lower(model, scalar)?;
     let stroke = model.actuator.stroke;
     let round = |value| scalar.round(value);
@@ -117,7 +119,7 @@ pub fn lower(
         pose: model.workspace.bounds().map(round),
         leg: [-stroke, LEG_SETPOINT_STROKES * stroke].map(round),
         sensor: model.sensor.range.map(round),
-        stroke: self::stroke(model, tables),
+        stroke: self::stroke(model, &strokes(tables, around)),
     };
     Ok(Ir {
         name: model.name.clone(),
@@ -155,11 +157,10 @@ pub fn lower(
     })
 }
 
-/// Travel of every leg, m: the smaller of the data sheet's stroke and every leg's table.
+/// Travel of every leg, m: the smaller of the data sheet's stroke and that of every leg's model.
 #[must_use]
-pub fn stroke(model: &Model, tables: &[EverettTable]) -> f64 {
-    let largest = tables.iter().map(|table| table.node(table.grid, 0));
-    largest.fold(model.actuator.stroke, |a, b| if b < a { b } else { a })
+pub fn stroke(model: &Model, strokes: &[f64]) -> f64 {
+    strokes.iter().copied().fold(model.actuator.stroke, |a, b| if b < a { b } else { a })
 }
 
 /// Arithmetic of the emitted controller.
@@ -205,14 +206,20 @@ fn task_space(
 }
 
 /// Tables in the layout of the controller, each distinct one once, with their indices and rates.
-fn hysteresis(model: &Model, tables: &[EverettTable], rate_tables: &[EverettTable], scalar: Scalar) -> Hysteresis {
+fn hysteresis(
+    model: &Model,
+    tables: &[EverettTable],
+    rate_tables: &[EverettTable],
+    around: &[Option<Around>],
+    scalar: Scalar,
+) -> Hysteresis {
     let (distinct, table_of_leg) = rate::distinct(tables, 1.0, scalar);
     Hysteresis {
         grid: model.hysteresis.grid,
         memory: model.hysteresis.memory,
         tables: distinct,
         table_of_leg,
-        rate: rate::lower(model, tables, rate_tables, scalar),
+        rate: rate::lower(model, tables, rate_tables, around, scalar),
         lead: rate::lead(model, scalar),
     }
 }

@@ -3,10 +3,12 @@
 use std::path::Path;
 
 use crate::everett::EverettTable;
+use crate::findings::Findings;
+use crate::leg_model::{Around, Family, FamilyScore, LegModel, choose};
 use crate::mode::Mode;
 use crate::rate::period::{INVERTED, Invertible};
 use crate::rate::{CreepTerm, Inertia, RateModel};
-use crate::{Options, Report, identify, is_simulated, is_table_csv, parse_record, rate, read_file, read_table_csv};
+use crate::{Options, Report, is_simulated, is_table_csv, parse_record, rate, read_file, read_leg_csv};
 use specgen_language::diagnostic::{Code, Diagnostic, Place, codes};
 use specgen_language::model::{Hysteresis, Model, RateDependence};
 use specgen_language::spec::LegLines;
@@ -15,11 +17,17 @@ use specgen_language::spec::LegLines;
 /// less than this, a wrong unit gives 1000.
 const LARGEST_SCALE: f64 = 5.0;
 
+const ONLY_TABLES: &str = "the legs have a leg model, and this command uses tables only: write hysteresis.model = \"preisach\" for it, or name tables without a leg model";
+
 /// Tables and reports of a spec's records.
 #[derive(Debug, Default)]
 pub struct SpecRecords {
     /// The table of each record, in the order of `hysteresis.records`.
     pub tables: Vec<EverettTable>,
+    /// What is around each of them, if anything.
+    pub around: Vec<Option<Around>>,
+    /// The choice of a leg model for each record that was fitted with `hysteresis.model`.
+    pub choices: Vec<(String, Family, Vec<FamilyScore>)>,
     /// The tables of the second weight of (6), m s/V, in the order of `hysteresis.rate_tables`.
     pub rate_tables: Vec<EverettTable>,
     /// Report of each identification; none for a record that is a table already.
@@ -67,6 +75,17 @@ impl SpecRecords {
         Some(of_tables(&model.hysteresis, of(&self.tables)?, of(&self.rate_tables), mode))
     }
 
+    /// For a command that uses tables only.
+    ///
+    /// # Errors
+    /// If a leg has more around its table.
+    pub fn tables_only(&self) -> Result<(), &'static str> {
+        match self.around.iter().any(Option::is_some) {
+            true => Err(ONLY_TABLES),
+            false => Ok(()),
+        }
+    }
+
     /// Refuses a period so short that most ticks would use the static inverse: that is not the controller in the spec.
     fn not_invertible(&self, model: &Model) -> Option<Diagnostic> {
         let pairs = (0..6).filter_map(|leg| {
@@ -80,24 +99,34 @@ impl SpecRecords {
     }
 
     fn add_record(&mut self, model: &Model, name: &str, text: String) -> Result<(), Vec<Diagnostic>> {
-        let table = if is_table_csv(&text) {
-            let table = read_table_csv(&text, name)?;
-            fits_spec(model, name, &table, codes::TABLE_MISMATCH, "hysteresis.records")?;
+        let found = if is_table_csv(&text) {
+            let found = read_leg_csv(&text, name)?;
+            let table = &found.table;
+            fits_spec(model, name, table, codes::TABLE_MISMATCH, "hysteresis.records")?;
             self.reports.push(None);
-            table
+            found
         } else {
             let options = Options::new(model.hysteresis.grid, model.actuator.voltage);
-            let identified = identify(&parse_record(&text, name)?, &options).map_err(about_voltage)?;
+            let record = parse_record(&text, name)?;
+            let choice = choose(&record, &options, model.hysteresis.model).map_err(about_voltage)?;
+            let identified = choice.table;
             if matches!(model.hysteresis.rate, RateDependence::Creep(_)) {
                 self.warnings.push(static_table_with_creep(model, name));
             }
             self.warnings.extend(identified.warnings);
             self.warnings.extend(faster_than_amplifier(model, name, identified.report.fastest));
             self.reports.push(Some(identified.report));
-            identified.table
+            if !choice.scores.is_empty() {
+                self.choices.push((name.to_owned(), choice.family, choice.scores));
+            }
+            choice.model
         };
-        let scale = of_right_scale(model, name, &table);
-        self.tables.push(table);
+        if found.around.is_some() && model.hysteresis.rate != RateDependence::Static {
+            return Err(vec![rate_and_leg_model(model, name)]);
+        }
+        let scale = of_right_scale(model, name, &found.table);
+        self.tables.push(found.table);
+        self.around.push(found.around);
         self.keep(name, text);
         scale
     }
@@ -148,7 +177,11 @@ pub fn of_lines((lines, mode, share): &LegLines, dir: &Path, leg: usize) -> Resu
         Ok((read_file(&dir.join(&name), &name)?, name))
     };
     let (text, name) = file(&lines.records)?;
-    let still = read_table_csv(&text, &name)?;
+    let LegModel { table: still, around: None } = read_leg_csv(&text, &name)? else {
+        let mut findings = Findings::new(&name);
+        findings.add(codes::TABLE_FILE, None, ONLY_TABLES.to_owned(), "identify the record with --model preisach");
+        return Err(findings.into_diagnostics());
+    };
     let mut second = None;
     if let RateDependence::DynamicPreisach(files) = &lines.rate {
         let (text, name) = file(files)?;
@@ -290,6 +323,17 @@ fn not_invertible(model: &Model, share: f64, needed: f64) -> Diagnostic {
 /// Rounds off the last digits.
 fn micro(milliseconds: f64) -> f64 {
     libm::round(milliseconds * 1e6) / 1e6
+}
+
+/// A leg model has its own creep.
+fn rate_and_leg_model(model: &Model, record: &str) -> Diagnostic {
+    Diagnostic::at(
+        &model.spans,
+        &["hysteresis.rate"],
+        codes::RATE_KEYS,
+        format!("the leg model of `{record}` has its own creep"),
+        "remove hysteresis.rate and its keys, or name a table without a leg model",
+    )
 }
 
 fn static_table_with_creep(model: &Model, record: &str) -> Diagnostic {

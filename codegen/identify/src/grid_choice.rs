@@ -199,7 +199,7 @@ fn mean_square(held_out: &Normal, weights: &[f64]) -> f64 {
 }
 
 /// Fold of each branch (none: always fitted), number of folds, number of groups.
-fn deal(record: &Record, branches: &[Branch], drive: [f64; 2]) -> (Vec<Option<usize>>, usize, usize) {
+pub(crate) fn deal(record: &Record, branches: &[Branch], drive: [f64; 2]) -> (Vec<Option<usize>>, usize, usize) {
     let peak = |b: &Branch| record.drive[if b.rising { b.end - 1 } else { b.first }];
     let mut peaks: Vec<f64> = branches.iter().map(peak).collect();
     peaks.sort_unstable_by(f64::total_cmp);

@@ -14,6 +14,7 @@
 //! |---|---|
 //! | `columns`, `container`, `record` | the reader of CSV, MATLAB, HDF5 and TDMS files; checked samples |
 //! | `normal`, `selection`, `residual` | normal equations, choice of the grid, causes of the residual |
+//! | [`leg_model`] | families of leg models fitted to a record, and the choice among them |
 //! | [`rate`] | records at several rates: dead time, dynamic Preisach (6), creep, each tested on the rate it was not fitted on |
 //! | [`response`], [`gauge`], [`stiffness`] | another record to an [`Estimate`] of values of the spec |
 //! | [`linear`], [`gains`] | records at several frequencies, and runs of a machine, to values of the spec |
@@ -38,6 +39,7 @@ pub mod gains;
 pub mod gauge;
 mod grid_choice;
 mod least_squares;
+pub mod leg_model;
 mod limits;
 pub mod linear;
 pub mod mode;
@@ -73,6 +75,7 @@ pub use estimate::{Estimate, Parameter};
 pub use export::{is_table_csv, read_table_csv, write_table_csv};
 pub use file::{MAX_FILE_BYTES, read_file};
 pub use grid_choice::{GridChoice, Score, choose_grid};
+pub use leg_model::{read_leg_csv, write_leg_csv};
 pub use rate::predict::{Drive, Prediction, PredictionError, predict, read_drive, validate};
 pub use reading::Reading;
 pub use record::{Record, parse_record, read_record};

@@ -18,7 +18,7 @@ mod export;
 mod fit;
 pub(crate) mod forward;
 mod joint;
-mod mixed;
+pub(crate) mod mixed;
 mod open_weight;
 pub mod period;
 pub(crate) mod predict;

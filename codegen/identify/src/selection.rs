@@ -31,7 +31,7 @@ pub(crate) struct RecordSpan {
     /// Falls from a reversal.
     pub(crate) curves: usize,
     /// Whether the record consists of first-order reversal curves.
-    first_order: bool,
+    pub(crate) first_order: bool,
 }
 
 impl RecordSpan {

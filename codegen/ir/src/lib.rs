@@ -13,9 +13,11 @@ mod task_space;
 use serde::{Serialize, Serializer};
 
 pub use permitted::*;
+use scalar::Numbers;
+use specgen_runtime::bouc_wen::READ_OUT;
 use specgen_runtime::dynamics::Leg;
+use specgen_runtime::{Creep, Platform, Real};
 pub use specgen_runtime::{Interaction, Law, SetpointKind};
-use specgen_runtime::{Platform, Real};
 pub use supervision::{Rest, Supervision, Wiring};
 pub use task_space::*;
 
@@ -279,6 +281,77 @@ pub enum RateModel {
         /// 1 + Σ w_j g_j.
         direct: f64,
     },
+    /// A Bouc-Wen state beside the table, a read-out and creep.
+    BoucWen {
+        /// Of each leg; all have the same number of creep operators.
+        legs: Box<[BoucWen; LEGS]>,
+    },
+}
+
+/// The constants of [`specgen_runtime::BoucWen`], where each is explained.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct BoucWen {
+    /// g_j = 1 − e^(−T/τ_j).
+    pub gains: Vec<f64>,
+    /// w_j.
+    pub weights: Vec<f64>,
+    /// w_j (1 − g_j).
+    pub carried: Vec<f64>,
+    /// 1 + Σ w_j g_j.
+    pub direct: f64,
+    /// Its reciprocal.
+    pub share: f64,
+    /// G.
+    pub read_out: [f64; READ_OUT],
+    /// F.
+    pub inverse: [f64; READ_OUT],
+    /// Range of h, m.
+    pub travel: [f64; 2],
+    /// a, m per cell.
+    pub slope: f64,
+    /// β + γ, per cell.
+    pub onward: f64,
+    /// β − γ, per cell.
+    pub back: f64,
+    /// a/(β + γ), m.
+    pub limit: f64,
+    /// z₀, m.
+    pub rest: f64,
+}
+
+impl BoucWen {
+    /// Every number, in the order of the runtime's checksum.
+    #[must_use]
+    pub fn numbers(&self) -> Vec<f64> {
+        let lists = [&self.gains, &self.weights, &self.carried].map(Vec::as_slice);
+        let after = [self.slope, self.onward, self.back, self.limit, self.rest];
+        [&lists.concat(), &[self.direct, self.share][..], &self.read_out, &self.inverse, &self.travel, &after].concat()
+    }
+
+    /// The runtime's type with `K` creep operators; none if there is another number of them.
+    pub fn constants<T: Real, const K: usize>(
+        &self,
+        numbers: &impl Numbers<T>,
+    ) -> Option<specgen_runtime::BoucWen<T, K>> {
+        let list = |values: &Vec<f64>| values.as_array().map(|values| numbers.vector::<K>(values));
+        Some(specgen_runtime::BoucWen {
+            creep: Creep {
+                gains: list(&self.gains)?,
+                weights: list(&self.weights)?,
+                carried: list(&self.carried)?,
+                direct: numbers.real(self.direct),
+            },
+            share: numbers.real(self.share),
+            read_out: numbers.vector(&self.read_out),
+            inverse: numbers.vector(&self.inverse),
+            travel: numbers.vector(&self.travel),
+            slope: numbers.real(self.slope),
+            onward: numbers.real(self.onward),
+            back: numbers.real(self.back),
+            limit: numbers.real(self.limit),
+            rest: numbers.real(self.rest),
+        })
+    }
 }
 
 /// Lead on the demand of a leg.

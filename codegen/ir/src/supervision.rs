@@ -51,6 +51,9 @@ pub struct Rest {
     pub displacement: [f64; LEGS],
     /// The same with the second weight of (6), m per cell per tick; zero in other models.
     pub rate: [f64; LEGS],
+    /// With a Bouc-Wen state: the table's part of the displacement, and z, of each leg, m.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub bouc_wen: Option<[[f64; 2]; LEGS]>,
 }
 
 impl Deref for Supervision {

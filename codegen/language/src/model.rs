@@ -21,7 +21,9 @@ use crate::keys::SCHEMA_VERSION;
 use crate::keys::declare::*;
 
 pub use electronics::{Actuator, Amplifier, Dac, Sensor};
-pub use hysteresis::{Adaptation, AdaptationMode, Hysteresis, LARGEST_RUN_INTERVAL, MAX_GRID, RateDependence};
+pub use hysteresis::{
+    Adaptation, AdaptationMode, Hysteresis, LARGEST_RUN_INTERVAL, LegModelKind, MAX_GRID, RateDependence,
+};
 pub use mcu::{BOARDS, Mcu, Part};
 pub use mechanics::{Geometry, LARGEST_TRAVEL, LARGEST_TURN, LegBody, RigidBody, Workspace};
 pub use structure::{StructuralKind, StructuralMode, StructuralUncertainty};

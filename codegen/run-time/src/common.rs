@@ -163,12 +163,14 @@ impl<T: Real + Debug> Common<T> {
         let (k, a) = (&ir.kinematics, &ir.actuation);
         let (tables, fresh) = models(convert, &ir.hysteresis)?;
         let (memory, displacement, code) = match &ir.supervision.risen {
-            None => (Box::new([fresh; LEGS]), [T::ZERO; LEGS], a.code_min),
+            None => (Box::new(fresh), [T::ZERO; LEGS], a.code_min),
             Some(rest) => {
                 let drive = convert.real(rest.drive);
                 let displacement = convert.vector(&rest.displacement);
                 let rate = convert.vector(&rest.rate);
-                let risen = std::array::from_fn(|leg| fresh.risen(drive, displacement[leg], rate[leg]));
+                let parts = convert.matrix(&rest.bouc_wen.unwrap_or_default());
+                let risen =
+                    std::array::from_fn(|leg| fresh[leg].risen(drive, displacement[leg], rate[leg], parts[leg]));
                 (Box::new(risen), displacement, ir.supervision.rest)
             }
         };

@@ -3,12 +3,13 @@
 use std::convert::Infallible;
 use std::fmt::Debug;
 
-use specgen_ir::scalar::Numbers as _;
-use specgen_ir::{Hysteresis, LEGS, RateModel};
+use specgen_ir::scalar::{Numbers as _, kept};
+use specgen_ir::{self as ir, Hysteresis, LEGS, RateModel};
 use specgen_law::LegMemory;
 use specgen_runtime::snapshot::{Field, InvalidState, Reader, WordSink};
 use specgen_runtime::{
-    Creep, CreepEverett, CreepMemory, DynamicEverett, DynamicMemory, LastLine, Nodes, Real, ReversalMemory, Snapshot,
+    BoucWenEverett, BoucWenMemory, Creep, CreepEverett, CreepMemory, DynamicEverett, DynamicMemory, LastLine, Nodes,
+    Real, ReversalMemory, Snapshot,
 };
 
 use crate::InvalidIr;
@@ -17,15 +18,16 @@ use crate::convert::Convert;
 /// Largest `hysteresis.memory`, extrema.
 pub const ROOM: usize = 256;
 
-/// A static model, a rate-dependent one, or one with a number of creep operators.
+/// A static model, a rate-dependent one, or one with a number of creep operators, with or without a Bouc-Wen state.
 macro_rules! models {
-    ($($creep:ident $count:literal),+) => {
+    ($($creep:ident $count:literal),+; $($bouc_wen:ident $terms:literal),+) => {
         /// Table of a leg.
         #[derive(Debug, Clone, Copy)]
         pub enum Table<T: Real> {
             Static(Nodes<'static, T>),
             Dynamic(DynamicEverett<T, Nodes<'static, T>>),
             $($creep(CreepEverett<'static, T, Nodes<'static, T>, $count>),)+
+            $($bouc_wen(BoucWenEverett<'static, T, Nodes<'static, T>, $terms>),)+
         }
 
         /// Memory of a leg's drive.
@@ -34,6 +36,7 @@ macro_rules! models {
             Static(ReversalMemory<T, ROOM>),
             Dynamic(DynamicMemory<T, ROOM>),
             $($creep(CreepMemory<T, ROOM, $count>),)+
+            $($bouc_wen(BoucWenMemory<T, ROOM, $terms>),)+
         }
 
         impl<T: Real> Field for Memory<T> {
@@ -48,6 +51,7 @@ macro_rules! models {
                     Memory::Static($name) => $value,
                     Memory::Dynamic($name) => $value,
                     $(Memory::$creep($name) => $value,)+
+                    $(Memory::$bouc_wen($name) => $value,)+
                 }
             };
         }
@@ -59,6 +63,7 @@ macro_rules! models {
                     (Memory::Static($name), Table::Static($table)) => $value,
                     (Memory::Dynamic($name), Table::Dynamic($table)) => $value,
                     $((Memory::$creep($name), Table::$creep($table)) => $value,)+
+                    $((Memory::$bouc_wen($name), Table::$bouc_wen($table)) => $value,)+
                     _ => unreachable!("a memory and a table of one spec"),
                 }
             };
@@ -69,7 +74,7 @@ macro_rules! models {
             tables: &[Nodes<'static, T>; LEGS],
             creep: [&[f64]; 3],
             direct: f64,
-        ) -> Result<([Table<T>; LEGS], Memory<T>), InvalidIr> {
+        ) -> Result<([Table<T>; LEGS], [Memory<T>; LEGS]), InvalidIr> {
             $(
                 if let [Some(gains), Some(weights), Some(carried)] = creep.map(<[f64; $count]>::from_slice) {
                     let creep = Creep {
@@ -80,14 +85,48 @@ macro_rules! models {
                     };
                     let creep = Box::leak(Box::new(creep));
                     let tables = tables.map(|still| Table::$creep(CreepEverett { still, creep }));
-                    return Ok((tables, Memory::$creep(CreepMemory::new())));
+                    return Ok((tables, [Memory::$creep(CreepMemory::new()); LEGS]));
                 }
             )+
             Err(InvalidIr::Part("the number of creep operators"))
         }
+
+        fn with_bouc_wen<T: Real>(
+            convert: &Convert<T>,
+            tables: &[Nodes<'static, T>; LEGS],
+            legs: &[ir::BoucWen; LEGS],
+        ) -> Result<([Table<T>; LEGS], [Memory<T>; LEGS]), InvalidIr> {
+            $(
+                let around: Option<Vec<_>> = legs.iter().map(|leg| leg.constants::<T, $terms>(convert)).collect();
+                if let Some(around) = around {
+                    let around: &'static [specgen_runtime::BoucWen<T, $terms>] = kept(around);
+                    let tables = std::array::from_fn(|leg| {
+                        Table::$bouc_wen(BoucWenEverett { still: tables[leg], around: &around[leg] })
+                    });
+                    let memory = |leg: usize| Memory::$bouc_wen(BoucWenMemory::new(around[leg].rest));
+                    return Ok((tables, std::array::from_fn(memory)));
+                }
+            )+
+            Err(InvalidIr::Part("the number of creep operators"))
+        }
+
+        impl<T: Real> Memory<T> {
+            /// Risen from negative saturation to `drive`; with a Bouc-Wen state, the table's part and z there.
+            pub fn risen(self, drive: T, displacement: T, rate: T, [still, lost]: [T; 2]) -> Self {
+                match self {
+                    Self::Static(_) => Self::Static(ReversalMemory::risen(drive, displacement)),
+                    Self::Dynamic(_) => Self::Dynamic(DynamicMemory::risen(drive, displacement, rate)),
+                    $(Self::$creep(_) => Self::$creep(CreepMemory::risen(drive, displacement)),)+
+                    $(Self::$bouc_wen(_) => Self::$bouc_wen(BoucWenMemory::risen(drive, still, lost, displacement)),)+
+                }
+            }
+        }
     };
 }
-models!(Creep1 1, Creep2 2, Creep3 3, Creep4 4, Creep5 5, Creep6 6);
+models!(
+    Creep1 1, Creep2 2, Creep3 3, Creep4 4, Creep5 5, Creep6 6;
+    BoucWen0 0, BoucWen1 1, BoucWen2 2, BoucWen3 3, BoucWen4 4, BoucWen5 5, BoucWen6 6
+);
 
 /// Converts a slice of exactly its length to an array.
 trait FromSlice: Sized {
@@ -97,22 +136,6 @@ trait FromSlice: Sized {
 impl<const N: usize> FromSlice for [f64; N] {
     fn from_slice(values: &[f64]) -> Option<&Self> {
         values.as_array()
-    }
-}
-
-impl<T: Real> Memory<T> {
-    /// Risen from negative saturation to `drive`.
-    pub fn risen(self, drive: T, displacement: T, rate: T) -> Self {
-        match self {
-            Self::Static(_) => Self::Static(ReversalMemory::risen(drive, displacement)),
-            Self::Dynamic(_) => Self::Dynamic(DynamicMemory::risen(drive, displacement, rate)),
-            Self::Creep1(_) => Self::Creep1(CreepMemory::risen(drive, displacement)),
-            Self::Creep2(_) => Self::Creep2(CreepMemory::risen(drive, displacement)),
-            Self::Creep3(_) => Self::Creep3(CreepMemory::risen(drive, displacement)),
-            Self::Creep4(_) => Self::Creep4(CreepMemory::risen(drive, displacement)),
-            Self::Creep5(_) => Self::Creep5(CreepMemory::risen(drive, displacement)),
-            Self::Creep6(_) => Self::Creep6(CreepMemory::risen(drive, displacement)),
-        }
     }
 }
 
@@ -158,11 +181,7 @@ impl<T: Real + Debug> LegMemory<T, Table<T>> for Memory<T> {
         displacement: T,
         permitted: impl FnOnce(T) -> Option<T>,
     ) -> bool {
-        match (self, table) {
-            (Self::Static(memory), Table::Static(table)) => memory.track(table, last, displacement, permitted),
-            // Only the static model has this fast path.
-            _ => false,
-        }
+        with_table!(self, table, (memory, table) => LegMemory::track(memory, table, last, displacement, permitted))
     }
 
     fn follow_within(&mut self, table: &Table<T>, displacement: T, permitted: impl FnOnce(T) -> T) -> bool {
@@ -171,20 +190,24 @@ impl<T: Real + Debug> LegMemory<T, Table<T>> for Memory<T> {
 }
 
 /// The table of each leg, and its memory after a sweep to the highest voltage and back.
-pub fn models<T: Real>(convert: &Convert<T>, h: &Hysteresis) -> Result<([Table<T>; LEGS], Memory<T>), InvalidIr> {
+pub fn models<T: Real>(
+    convert: &Convert<T>,
+    h: &Hysteresis,
+) -> Result<([Table<T>; LEGS], [Memory<T>; LEGS]), InvalidIr> {
     let tables = nodes(convert, h, &h.tables, &h.table_of_leg)?;
     Ok(match &h.rate {
-        None => (tables.map(Table::Static), Memory::Static(ReversalMemory::new())),
+        None => (tables.map(Table::Static), [Memory::Static(ReversalMemory::new()); LEGS]),
         Some(RateModel::DynamicPreisach { tables: rates, table_of_leg, tolerance }) => {
             let rates = nodes(convert, h, rates, table_of_leg)?;
             let tolerance = convert.real(*tolerance);
             let of_leg =
                 |leg: usize| Table::Dynamic(DynamicEverett { still: tables[leg], rate: rates[leg], tolerance });
-            (std::array::from_fn(of_leg), Memory::Dynamic(DynamicMemory::new()))
+            (std::array::from_fn(of_leg), [Memory::Dynamic(DynamicMemory::new()); LEGS])
         }
         Some(RateModel::Creep { gains, weights, carried, direct }) => {
             with_creep(convert, &tables, [gains, weights, carried], *direct)?
         }
+        Some(RateModel::BoucWen { legs }) => with_bouc_wen(convert, &tables, legs)?,
     })
 }
 

@@ -3,7 +3,8 @@
 use core::fmt::Debug;
 
 use specgen_runtime::{
-    CreepEverett, CreepMemory, DynamicEverett, DynamicMemory, Grid, LastLine, Real, ReversalMemory, Snapshot,
+    BoucWenEverett, BoucWenMemory, CreepEverett, CreepMemory, DynamicEverett, DynamicMemory, Grid, LastLine, Real,
+    ReversalMemory, Snapshot,
 };
 
 /// Memory of a leg's drive; forward model and inverse over a table.
@@ -90,6 +91,29 @@ leg_memory! {
         #[inline(always)]
         fn fell_back(&self) -> bool {
             self.fell_back()
+        }
+    }
+    ['a, T: Real + Debug, G: Grid<T>, const CAP: usize, const K: usize]
+        BoucWenEverett<'a, T, G, K>, BoucWenMemory<T, CAP, K>
+    {
+        #[inline(always)]
+        fn track(
+            &mut self,
+            table: &BoucWenEverett<'a, T, G, K>,
+            last: &mut LastLine<T>,
+            displacement: T,
+            permitted: impl FnOnce(T) -> Option<T>,
+        ) -> bool {
+            self.track(table, last, displacement, permitted)
+        }
+        #[inline(always)]
+        fn follow_within(
+            &mut self,
+            table: &BoucWenEverett<'a, T, G, K>,
+            displacement: T,
+            permitted: impl FnOnce(T) -> T,
+        ) -> bool {
+            self.follow_within(table, displacement, permitted)
         }
     }
     ['a, T: Real + Debug, G: Grid<T>, const CAP: usize, const K: usize] CreepEverett<'a, T, G, K>, CreepMemory<T, CAP, K> {}

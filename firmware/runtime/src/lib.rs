@@ -12,6 +12,7 @@
 //! | [`memory`] | reversal memory: forward Preisach model, its inverse, bounded storage | section 3, operator Γ and Γ⁻¹ |
 //! | [`dynamic`] | rate-dependent model and inverse: a second weight times the rate of the drive | section 3, (6) |
 //! | [`creep`] | rate dependence as creep behind the static model, and its inverse | |
+//! | [`bouc_wen`] | a Bouc-Wen state beside the table, a read-out and creep, and their inverse | |
 //! | [`adaptation`] | run-to-run EWMA and PCC | (AII.3), (AII.5), (AII.6) |
 //! | [`mode`] | P, F, P/F; where the interaction force comes from | section 4 |
 //! | [`feedback`] | position feedback with anti-windup | (7) |
@@ -46,6 +47,7 @@
 
 pub mod adaptation;
 pub mod attitude;
+pub mod bouc_wen;
 mod choice;
 mod constants;
 pub mod correction;
@@ -85,6 +87,7 @@ pub mod wave;
 
 pub use adaptation::{Estimate, Law};
 pub use attitude::{Attitude, Series};
+pub use bouc_wen::{BoucWen, BoucWenEverett, BoucWenMemory};
 pub use correction::{Correction, CorrectionLimit, RequestCorrection};
 pub use crc::Crc32;
 pub use creep::{Creep, CreepEverett, CreepMemory};

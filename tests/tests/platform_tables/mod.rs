@@ -9,6 +9,7 @@ mod damping;
 mod lead;
 mod learning;
 mod limits;
+mod non_repeating;
 mod oracle;
 mod response;
 mod rest;

@@ -343,6 +343,21 @@ fn a_platform_with_every_part_of_the_law_has_the_bits_of_the_emitted_one() {
     alike("parts-f32", "features/triggers.toml", &[("[control]", parts.as_str())]);
 }
 
+/// Plays, a Bouc-Wen state, a read-out and creep.
+const LEG_MODEL: (&str, &str) = ("memory  = 64", "memory  = 64\nmodel   = \"bouc-wen-plays\"");
+
+#[test]
+fn a_platform_with_a_leg_model_of_every_part_has_the_bits_of_the_emitted_one() {
+    alike("leg-model", "reference.toml", &[LEG_MODEL]);
+}
+
+#[test]
+#[ignore = "long: another controller with a leg model"]
+fn six_legs_with_a_leg_model_in_single_precision_have_the_bits_of_the_emitted_ones() {
+    let edits = [LEG_MODEL, ("scalar   = \"f64\"", "scalar   = \"f32\"")];
+    alike("leg-model-f32", "legs.toml", &edits);
+}
+
 #[test]
 #[ignore = "long: a controller with creep"]
 fn six_legs_with_creep_have_the_bits_of_the_emitted_ones() {

@@ -61,11 +61,11 @@ fn table(model: &Model) -> EverettTable {
 
 pub fn lowered(model: &Model) -> Result<Ir, Vec<Diagnostic>> {
     let Some(task) = model.task_space.as_ref() else {
-        return lower::lower(model, None, &[table(model)], &[], origin());
+        return lower::lower(model, None, &[table(model)], &[], &[], origin());
     };
     let design = platform::design(model, task, &RestDynamics::of(&lower::platform(model)?))?;
     let (setpoints, _) = lower::setpoint::lower(model, task, &[], lower::scalar(model))?;
-    lower::lower(model, Some((&design, setpoints)), &[table(model)], &[], origin())
+    lower::lower(model, Some((&design, setpoints)), &[table(model)], &[], &[], origin())
 }
 
 fn origin() -> Origin<'static> {

@@ -6,6 +6,7 @@
 use clap::{Args, Subcommand};
 use specgen_identify::mode::Mode;
 use specgen_identify::{DeadTime, Reading};
+use specgen_language::model::LegModelKind;
 use specgen_language::outcome::Failure;
 use specgen_language::ui::Ui;
 use specgen_report::identify::{Bench, estimates, everett, gains, linear, predict, rate};
@@ -62,6 +63,9 @@ struct EverettArguments {
     /// Dead time from the drive column to the displacement, ms; estimated if not given and the record shows it.
     #[arg(long, value_name = "MS", value_parser = number("", "milliseconds from 0 to 10", 0.0..=10.0), allow_negative_numbers = true)]
     dead_time: Option<f64>,
+    /// Leg model: auto compares the families on curves that are held out; or preisach, bouc-wen, generalized-plays, plays, bouc-wen-plays.
+    #[arg(long, value_name = "MODEL", value_parser = model, default_value = "preisach")]
+    model: LegModelKind,
     /// A second record of the leg, not used in the fit, to validate the table.
     #[arg(long, value_name = "RECORD")]
     validate: Option<InputFile>,
@@ -242,6 +246,11 @@ fn grid(text: &str) -> Result<usize, String> {
     text.parse().map_err(|_| format!("expected a whole number, found `{text}`"))
 }
 
+/// A family of leg models.
+fn model(text: &str) -> Result<LegModelKind, String> {
+    LegModelKind::of_word(text).ok_or_else(|| format!("expected {}, found `{text}`", LegModelKind::words()))
+}
+
 /// A mode, or none.
 #[derive(Debug, Clone, Copy)]
 struct ModeArgument(Option<Mode>);
@@ -293,7 +302,8 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
             rate::run(records, *drive, *grid, hold_out.as_deref(), output.as_deref(), &bench.bench()?, ui)
         }
         None => {
-            let EverettArguments { record, drive, grid, dead_time, validate, output, bench } = &arguments.everett;
+            let EverettArguments { record, drive, grid, dead_time, model, validate, output, bench } =
+                &arguments.everett;
             // clap requires both unless there is a subcommand.
             let (Some(record), Some(drive)) = (record, drive) else {
                 return Err(Failure::Usage(
@@ -301,8 +311,8 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
                 ));
             };
             let dead_time = dead_time.map_or(DeadTime::Estimate, |ms| DeadTime::Fixed(ms * 1e-3));
-            let choices = everett::Choices { drive: *drive, grid: *grid, dead_time };
-            everett::run(record, choices, validate.as_deref(), output.as_deref(), &bench.bench()?, ui)
+            let options = everett::Options { drive: *drive, grid: *grid, dead_time, model: *model };
+            everett::run(record, &options, validate.as_deref(), output.as_deref(), &bench.bench()?, ui)
         }
     }
 }

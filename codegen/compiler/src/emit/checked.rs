@@ -13,8 +13,15 @@ pub fn emit(ir: &Ir) -> TokenStream {
     let (identity, length) = (&ir.integrity.identity, literal::count(ir.integrity.identity.len()));
     let identity = Literal::byte_string(identity.as_bytes());
     let tables = tables(ir);
-    let creep = matches!(ir.hysteresis.rate, Some(RateModel::Creep { .. }))
-        .then(|| quote! { black_box(&hysteresis::CREEP_OF_LEGS).checksum(crc); });
+    let creep = match ir.hysteresis.rate {
+        Some(RateModel::Creep { .. }) => Some(quote! { black_box(&hysteresis::CREEP_OF_LEGS).checksum(crc); }),
+        Some(RateModel::BoucWen { .. }) => Some(quote! {
+            for around in black_box(&hysteresis::AROUND_OF_LEGS) {
+                around.checksum(crc);
+            }
+        }),
+        _ => None,
+    };
     let (setpoint, trajectories) = match ir.task_space {
         None => (None, None),
         Some(_) => (

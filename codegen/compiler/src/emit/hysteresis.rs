@@ -101,6 +101,49 @@ fn rate(ir: &Ir, of_leg: &[Ident]) -> Rate {
                 },
             }
         }
+        Some(RateModel::BoucWen { legs }) => {
+            let creep = literal::count(legs[0].gains.len());
+            let entries = of_leg.iter().enumerate().map(|(leg, table)| {
+                let leg = literal::count(leg);
+                quote! { BoucWenEverett { still: Everett { nodes: &#table }, around: &AROUND_OF_LEGS[#leg] } }
+            });
+            let around = legs.iter().map(|leg| {
+                let list = |values: &[f64]| literal::reals(ir.scalar, values);
+                let (gains, weights, carried) = (list(&leg.gains), list(&leg.weights), list(&leg.carried));
+                let (read_out, inverse, travel) = (list(&leg.read_out), list(&leg.inverse), list(&leg.travel));
+                let [direct, share, slope, onward, back, limit, rest] =
+                    [leg.direct, leg.share, leg.slope, leg.onward, leg.back, leg.limit, leg.rest]
+                        .map(|value| literal::real(ir.scalar, value));
+                quote! {
+                    BoucWen {
+                        creep: Creep { gains: [#gains], weights: [#weights], carried: [#carried], direct: #direct },
+                        share: #share,
+                        read_out: [#read_out],
+                        inverse: [#inverse],
+                        travel: [#travel],
+                        slope: #slope,
+                        onward: #onward,
+                        back: #back,
+                        limit: #limit,
+                        rest: #rest,
+                    }
+                }
+            });
+            Rate {
+                imports: quote! { {BoucWen, BoucWenEverett, BoucWenMemory, Creep, Everett} },
+                types: [
+                    quote! { BoucWenEverett<'static, Real, Everett<Real, GRID, NODES>, CREEP> },
+                    quote! { BoucWenMemory<Real, MEMORY, CREEP> },
+                ],
+                entries: entries.collect(),
+                constants: quote! {
+                    /// Creep operators.
+                    pub const CREEP: usize = #creep;
+                    /// What is around the table of each leg, over a tick of `timing.period`; from `hysteresis.records`.
+                    pub(crate) static AROUND_OF_LEGS: [BoucWen<Real, CREEP>; LEGS] = [#(#around),*];
+                },
+            }
+        }
         Some(RateModel::Creep { gains, weights, carried, direct }) => {
             let count = literal::count(gains.len());
             let list = |values: &[f64]| literal::reals(ir.scalar, values);
@@ -163,6 +206,9 @@ fn rate_doc(ir: &Ir) -> Vec<&'static str> {
             " Γ is the dynamic Preisach model (6), its rate being that of one tick to the next; see `specgen_runtime::dynamic`.",
             " Where (6) cannot be inverted safely the static inverse is used, and `STATIC_INVERSE` says so.",
         ]),
+        Some(RateModel::BoucWen { .. }) => {
+            lines.push(" Γ is a table with a Bouc-Wen state, a read-out and creep; see `specgen_runtime::bouc_wen`.");
+        }
         Some(RateModel::Creep { .. }) => {
             lines.push(" Γ is the static model with creep behind it; see `specgen_runtime::creep`.");
         }

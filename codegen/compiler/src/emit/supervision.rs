@@ -70,6 +70,16 @@ fn counts_in(words: &[u32]) -> TokenStream {
     quote! { #(#words),* }
 }
 
+/// Memories of the legs at the lowest voltage after a sweep to the highest and back.
+fn new_memories(ir: &Ir) -> TokenStream {
+    let Some(RateModel::BoucWen { legs }) = &ir.hysteresis.rate else { return quote! { [Memory::new(); 6] } };
+    let memories = legs.iter().map(|leg| {
+        let rest = literal::real(ir.scalar, leg.rest);
+        quote! { Memory::new(#rest) }
+    });
+    quote! { [#(#memories),*] }
+}
+
 /// State of the legs at reset, which is at rest. One for all if they rest at the lowest voltage, where every history is
 /// erased.
 fn at_rest(ir: &Ir) -> TokenStream {
@@ -77,7 +87,7 @@ fn at_rest(ir: &Ir) -> TokenStream {
     let (doc, memory, displacement, code) = match &ir.supervision.risen {
         None => (
             " Reset: lowest voltage after a sweep to the highest and back, gauges zeroed there.",
-            quote! { [Memory::new(); 6] },
+            new_memories(ir),
             quote! { [0.0; 6] },
             quote! { limits::CODES[0] },
         ),
@@ -89,7 +99,13 @@ fn at_rest(ir: &Ir) -> TokenStream {
                     let rate = real(rest.rate[leg]);
                     quote! { , #rate }
                 });
-                quote! { Memory::risen(#drive, #displacement #rate) }
+                match &rest.bouc_wen {
+                    None => quote! { Memory::risen(#drive, #displacement #rate) },
+                    Some(parts) => {
+                        let [still, lost] = parts[leg].map(real);
+                        quote! { Memory::risen(#drive, #still, #lost, #displacement) }
+                    }
+                }
             });
             let displacements = rest.displacement.map(real);
             (

@@ -63,6 +63,7 @@ pub(super) fn lower(
             [gains, weights, carried].into_iter().for_each(|values| add(values));
             add(&[*direct]);
         }
+        Some(RateModel::BoucWen { legs }) => legs.iter().for_each(|leg| add(&leg.numbers())),
     }
     for trajectory in task.iter().flat_map(|task| &task.setpoints.trajectories) {
         match &trajectory.path {

@@ -115,6 +115,10 @@ fn legs(hysteresis: &Hysteresis, bounds: &Bounds, kinematics: &Kinematics) -> [f
             (still + hysteresis.grid as f64 * rate, rate)
         }
         Some(RateModel::Creep { weights, .. }) => (still * (1.0 + weights.iter().map(|w| w.abs()).sum::<f64>()), 0.0),
+        Some(RateModel::BoucWen { legs }) => {
+            let creep = legs.iter().map(|leg| leg.travel[1] * (1.0 + leg.weights.iter().sum::<f64>()));
+            (largest(creep.chain([still])), 0.0)
+        }
     };
     let lead = hysteresis.lead.as_ref().map_or(0.0, |lead| lead.limit);
     let demanded = largest(bounds.leg.into_iter().chain([bounds.stroke, kinematics.largest_displacement])) + lead;

@@ -1,8 +1,11 @@
 //! Rate dependence of the leg model: constants at the period of the spec.
 
-use crate::ir::{LEGS, Lead, RateModel, Scalar};
+use crate::ir::{BoucWen, LEGS, Lead, RateModel, Scalar};
 use specgen_identify::everett::EverettTable;
+use specgen_identify::leg_model::Around;
 use specgen_language::model::{Model, RateDependence};
+
+use specgen_runtime::bouc_wen::READ_OUT;
 
 /// Tolerance of the inverse, as a share of a converter code.
 const SHARE_OF_CODE: f64 = 0.125;
@@ -29,11 +32,15 @@ pub(super) fn lower(
     model: &Model,
     tables: &[EverettTable],
     rate_tables: &[EverettTable],
+    around: &[Option<Around>],
     scalar: Scalar,
 ) -> Option<RateModel> {
     let round = |value: f64| scalar.round(value);
     let period = model.timing.period;
     let [min, max] = model.actuator.voltage;
+    if around.iter().any(Option::is_some) {
+        return Some(bouc_wen(model, tables, around, scalar));
+    }
     match &model.hysteresis.rate {
         RateDependence::Static => None,
         RateDependence::DynamicPreisach(_) => {
@@ -48,16 +55,76 @@ pub(super) fn lower(
             Some(RateModel::DynamicPreisach { tables: distinct, table_of_leg, tolerance })
         }
         RateDependence::Creep(terms) => {
-            let gain = |time: f64| -libm::expm1(-period / time);
-            let direct = terms.iter().fold(1.0, |sum, [time, weight]| sum + weight * gain(*time));
-            Some(RateModel::Creep {
-                gains: terms.iter().map(|[time, _]| round(gain(*time))).collect(),
-                weights: terms.iter().map(|[_, weight]| round(*weight)).collect(),
-                carried: terms.iter().map(|[time, weight]| round(weight * (1.0 - gain(*time)))).collect(),
-                direct: round(direct),
-            })
+            let [gains, weights, carried] = creep(terms, period).map(|list| list.into_iter().map(round).collect());
+            Some(RateModel::Creep { gains, weights, carried, direct: round(direct(terms, period)) })
         }
     }
+}
+
+/// g_j, w_j and w_j (1 − g_j) of creep operators over a tick of `period` (s).
+fn creep(terms: &[[f64; 2]], period: f64) -> [Vec<f64>; 3] {
+    [
+        terms.iter().map(|[time, _]| gain(*time, period)).collect(),
+        terms.iter().map(|[_, weight]| *weight).collect(),
+        terms.iter().map(|[time, weight]| weight * (1.0 - gain(*time, period))).collect(),
+    ]
+}
+
+/// 1 + Σ w_j g_j.
+fn direct(terms: &[[f64; 2]], period: f64) -> f64 {
+    terms.iter().fold(1.0, |sum, [time, weight]| sum + weight * gain(*time, period))
+}
+
+fn gain(time: f64, period: f64) -> f64 {
+    -libm::expm1(-period / time)
+}
+
+/// What is around the table of each leg, in m and cells. A leg without anything has none of its parts.
+fn bouc_wen(model: &Model, tables: &[EverettTable], around: &[Option<Around>], scalar: Scalar) -> RateModel {
+    /// µm.
+    const UNIT: f64 = 1e-6;
+    let round = |value: f64| scalar.round(value);
+    let period = model.timing.period;
+    let [min, max] = model.actuator.voltage;
+    let volts_per_cell = (max - min) / model.hysteresis.grid as f64;
+    // Every leg has the same number of creep operators; those that it lacks have no weight.
+    let operators = around.iter().flatten().map(|around| around.creep.len()).max().unwrap_or(0);
+    let leg = |leg: usize| {
+        let at = if around.len() == LEGS { leg } else { 0 };
+        let own = around[at].clone().unwrap_or_else(|| Around::of_table(&tables[at]));
+        let mut terms = own.creep.clone();
+        terms.resize(operators, [1.0, 0.0]);
+        // Checked where the leg model was made or read.
+        let (inverse, _) = own.inverse().unwrap_or_default();
+        // Coefficients in powers of m.
+        let powers = |c: [f64; READ_OUT]| {
+            let mut unit = UNIT;
+            c.map(|c| {
+                unit /= UNIT;
+                round(c * unit)
+            })
+        };
+        let [gains, weights, carried] = creep(&terms, period).map(|list| list.into_iter().map(round).collect());
+        let direct = direct(&terms, period);
+        let onward = (own.beta + own.gamma) * volts_per_cell;
+        let slope = own.slope * UNIT * volts_per_cell;
+        BoucWen {
+            gains,
+            weights,
+            carried,
+            direct: round(direct),
+            share: round(1.0 / direct),
+            read_out: powers(own.read_out),
+            inverse: powers(inverse),
+            travel: own.range().map(|h| round(h * UNIT)),
+            slope: round(slope),
+            onward: round(onward),
+            back: round((own.beta - own.gamma) * volts_per_cell),
+            limit: round(if slope > 0.0 { slope / onward } else { 0.0 }),
+            rest: round(own.rest_um * UNIT),
+        }
+    };
+    RateModel::BoucWen { legs: Box::new(core::array::from_fn(leg)) }
 }
 
 /// The dead time less half a period, because a held voltage corresponds to the middle of its tick, and for six legs with

@@ -216,7 +216,8 @@ fn build(source: &SpecSource, table_of_poses: Option<&str>) -> Result<GoldenOutp
     let rest = rest::noise(&model, design.as_ref());
     let task = design.as_ref().zip(setpoints);
     let origin = Origin { digest: "digest", assumed: Assumptions::of(&model, Vec::new()).list() };
-    let lowered = lower::lower(&model, task, &tables, &rate_tables, origin).map_err(|found| findings.extend(found));
+    let lowered =
+        lower::lower(&model, task, &tables, &rate_tables, &[], origin).map_err(|found| findings.extend(found));
     let Ok(ir) = lowered else { return Err(findings) };
     figures["noise"] = json!(format!("{:?}", lower::pose_noise(&model)));
     if let Ok(rest) = &rest {

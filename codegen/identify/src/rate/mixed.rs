@@ -9,7 +9,7 @@ use specgen_numerics::Factor;
 use specgen_numerics::nnls::{self, Failure};
 
 /// Minimises ½ wᵀGw − bᵀw with the first `bounded` entries of w ≥ 0. `gram` is symmetric, both triangles filled.
-pub(super) fn solve(gram: &DMatrix<f64>, rhs: &[f64], bounded: usize) -> Result<Vec<f64>, Failure> {
+pub(crate) fn solve(gram: &DMatrix<f64>, rhs: &[f64], bounded: usize) -> Result<Vec<f64>, Failure> {
     let free = rhs.len() - bounded;
     if free == 0 {
         return nnls::solve(gram, rhs).map(|solution| solution.weights);

@@ -24,6 +24,8 @@ section! {
         memory: usize = integer(8, 256), Default(64), "" ["depth"], 64;
         /// Reversal-curve files, relative to the spec: one for all legs, or six. A table written by `specgen identify -o` is used as it is.
         records: Vec<String> = Shape::Records, Required, "" ["record", "file", "files", "data"], ["records/reference-forc.csv"];
+        /// Leg model of reversal-curve records: the Preisach table; or chosen by its error on curves that were held out, "auto"; or a family by name, with creep where the record shows it. A table written by `specgen identify -o` keeps its own.
+        model: LegModelKind = one_of(LegModelKind::WORDS), Default("preisach"), "" ["leg_model", "family"], "preisach";
         /// Rate dependence in model and inverse: none; the dynamic Preisach model (6); creep after the static model. `specgen identify rate` compares them.
         rate = one_of(&["static", "dynamic-preisach", "creep"]), Default("static"), "", "creep";
         /// With "dynamic-preisach": tables of the second weight, from `specgen identify rate -o`: one for all legs or six.
@@ -39,6 +41,41 @@ section! {
         /// Rate dependence of the model.
         rate: RateDependence = rate(fields)?;
     }
+}
+
+choice! {
+    /// Families of leg models, the simplest first.
+    LegModelKind {
+        /// The Everett table.
+        Preisach = "preisach",
+        /// One Bouc-Wen state with a read-out.
+        BoucWen = "bouc-wen",
+        /// Plays, each with a cubic read-out: a generalized Prandtl-Ishlinskii model.
+        GeneralizedPlays = "generalized-plays",
+        /// Plays with a common read-out.
+        Plays = "plays",
+        /// Plays and one Bouc-Wen state with a common read-out.
+        Hybrid = "bouc-wen-plays",
+        /// The one with the least error on curves that were held out.
+        Auto = "auto",
+    }
+}
+
+impl LegModelKind {
+    /// That of a word in a spec.
+    #[must_use]
+    pub fn of_word(word: &str) -> Option<Self> {
+        Self::FITTED.into_iter().chain([Self::Auto]).find(|kind| kind.word() == word)
+    }
+
+    /// All words.
+    #[must_use]
+    pub fn words() -> String {
+        Self::WORDS.join(", ")
+    }
+
+    /// Those that are fitted.
+    pub const FITTED: [Self; 5] = [Self::Preisach, Self::BoucWen, Self::GeneralizedPlays, Self::Plays, Self::Hybrid];
 }
 
 /// Rate dependence of the leg model.

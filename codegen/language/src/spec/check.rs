@@ -57,6 +57,7 @@ const CHECKS: &[Check] = &[
     control::bias_inside_workspace,
     rate::keys_of_option,
     rate::creep_lists,
+    rate::model_without_rate,
     rate::dead_time_of_legs,
     gauges::six,
     gauges::directions,

@@ -1,6 +1,7 @@
 //! `specgen identify RECORD`: a record of reversal curves in, an Everett table and its figures out.
 
 use crate::drawing::wrote;
+use specgen_identify::leg_model::{Choice, FamilyScore, choose};
 use specgen_identify::{self as identify, DeadTime, GridChoice, Prediction, Reading, Report};
 use std::fmt::Write as _;
 use std::path::Path;
@@ -11,20 +12,23 @@ use super::cause::account;
 use super::{Bench, MeasuredKeys, predict, refused};
 use crate::identification as figure;
 use specgen_language::diagnostic::Diagnostic;
+use specgen_language::model::LegModelKind;
 use specgen_language::outcome::{Failure, Outcome};
 use specgen_language::output::write_file;
 use specgen_language::table::{right, row};
 use specgen_language::ui::Ui;
 
-/// What the user chooses.
+/// What to fit.
 #[derive(Debug, Clone, Copy)]
-pub struct Choices {
-    /// Range of the table, V.
+pub struct Options {
+    /// Lowest and highest voltage of the table, V.
     pub drive: [f64; 2],
-    /// Intervals per axis; by cross-validation if not given.
+    /// Cells per axis; chosen if none.
     pub grid: Option<usize>,
     /// Of the record.
     pub dead_time: DeadTime,
+    /// Family of the leg model.
+    pub model: LegModelKind,
 }
 
 /// Reads the record, identifies, writes the requested files and shows the result.
@@ -33,7 +37,7 @@ pub struct Choices {
 /// A file cannot be read or written, or its data are unsuitable.
 pub fn run(
     path: &Path,
-    Choices { drive, grid, dead_time }: Choices,
+    &Options { drive, grid, dead_time, model }: &Options,
     validation: Option<&Path>,
     output: Option<&Path>,
     bench: &Bench,
@@ -48,14 +52,16 @@ pub fn run(
     };
     let grid = grid.or(choice.as_ref().map(|c| c.chosen)).unwrap_or_default();
     let options = identify::Options { dead_time, ..identify::Options::new(grid, drive) };
-    let identified = identify::identify(&record, &options).map_err(refused)?;
+    let chosen = choose(&record, &options, model).map_err(refused)?;
+    let families = families(&chosen, grid);
+    let Choice { table: identified, model, scores, .. } = chosen;
     ui.findings(None, &identified.warnings);
     let validation = match validation {
         Some(path) => Some(validate(path, &identified, reading).map_err(refused)?),
         None => None,
     };
     if let Some(output) = output {
-        let text = identify::write_table_csv(&identified.table);
+        let text = identify::write_leg_csv(&model);
         let text = if record.simulated { identify::marked_as_simulated(&text) } else { text };
         write_file(output, text.as_bytes())?;
     }
@@ -69,6 +75,8 @@ pub fn run(
         validation: validation.as_ref(),
         grid_choice: choice.as_ref(),
         measured: MeasuredKeys::of(&["hysteresis.grid", "hysteresis.records"], record.simulated),
+        scores,
+        families,
         files: table.into_iter().chain(plot).collect(),
     });
     Ok(())
@@ -85,6 +93,12 @@ struct Table<'a> {
     validation: Option<&'a Prediction>,
     grid_choice: Option<&'a GridChoice>,
     measured: MeasuredKeys,
+    /// Errors of the families of leg models.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    scores: Vec<FamilyScore>,
+    /// The same as text.
+    #[serde(skip)]
+    families: String,
     /// One line per written file.
     #[serde(skip)]
     files: String,
@@ -99,6 +113,7 @@ impl Outcome for Table<'_> {
         if let Some(validation) = self.validation {
             let _ = writeln!(text, "{}: {}", validation.record, predict::summary(validation));
         }
+        text += &self.families;
         let _ = writeln!(text, "lines for the spec:\n[hysteresis]\ngrid = {}", self.grid);
         text + &self.measured.text() + &self.files
     }
@@ -111,6 +126,25 @@ fn validate(
 ) -> Result<Prediction, Vec<Diagnostic>> {
     let record = identify::read_record(path, &path.display().to_string(), reading)?;
     identify::validate(&identified.table, &record, identified.report.dead_time)
+}
+
+/// The held-out error of every family, and its price.
+fn families(choice: &Choice, grid: usize) -> String {
+    if choice.scores.is_empty() {
+        return String::new();
+    }
+    let mut text = String::from("leg model by cross-validation: whole curves held out, each without its mean\n");
+    let columns = [24, 14, 11, 14, 8].map(|width| right(width).behind("  "));
+    row(&mut text, &columns, &[&"model", &"held-out error", &"± std err", &"instructions", &"bytes"]);
+    for score in &choice.scores {
+        let mark = if score.family == choice.family { "  <- chosen" } else { "" };
+        let [held_out, error] =
+            [score.held_out_rms, score.standard_error].map(|error| format!("{:.2} nm", error * 1e9));
+        let bytes = format!("{:>8}{mark}", score.family.bytes(grid));
+        row(&mut text, &columns, &[&score.family.name(), &held_out, &error, &score.family.instructions(), &bytes]);
+    }
+    text += "  the simplest within one standard error or a fifth of the best; instructions of one leg, Cortex-M7, f64, about\n";
+    text
 }
 
 /// The held-out error of every grid.

@@ -50,6 +50,7 @@ pub fn run(recording: &Path, spec: &Path, output: Option<&str>, ui: &mut Ui) -> 
     let simulated = !compiled.assumptions.simulated.is_empty();
     let dir = spec.parent().unwrap_or(Path::new(""));
     let tables = declared::records(model, dir).map_err(refused)?;
+    tables.tables_only().map_err(|why| refuse(&why))?;
 
     let mut machine = Supervised::new(controllers::at_run_time(&compiled, ui)?);
     ui.progress("replaying the record");

@@ -10,7 +10,7 @@ use crate::identification as figure;
 use specgen_compiler::spec_file;
 use specgen_identify::mode::{self, Mode};
 use specgen_identify::rate::{Inertia, RateModel};
-use specgen_identify::{Drive, Input, Prediction, declared, predict, read_drive, read_file, read_table_csv};
+use specgen_identify::{Drive, Input, Prediction, declared, predict, read_drive, read_file, read_leg_csv};
 use specgen_language::outcome::{Failure, Outcome, Refusal};
 use specgen_language::output::write_file;
 use specgen_language::spec::{SpecSource, leg_lines};
@@ -77,13 +77,18 @@ fn model(path: &Path, leg: usize, ui: &mut Ui) -> Result<RateModel, Failure> {
         let model = spec_file::model(path)?;
         let declared = declared::records(&model, dir).map_err(refused)?;
         ui.findings(None, &declared.warnings);
+        declared.tables_only().map_err(|why| Failure::Gate(format!("{}: {why}", path.display())))?;
         return declared
             .leg(&model, leg)
             .ok_or_else(|| Failure::Usage(format!("`{}` has no records in hysteresis.records", path.display())));
     }
     let shown = path.display().to_string();
     let text = read_file(path, &shown).map_err(refused)?;
-    Ok(RateModel::of_table(read_table_csv(&text, &shown).map_err(refused)?, 0.0))
+    let found = read_leg_csv(&text, &shown).map_err(refused)?;
+    if found.around.is_some() {
+        return Err(Failure::Gate(format!("{shown}: a leg model; this command predicts tables only")));
+    }
+    Ok(RateModel::of_table(found.table, 0.0))
 }
 
 /// Numbers have the shortest form that reads back exactly.

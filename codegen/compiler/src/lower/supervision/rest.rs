@@ -44,7 +44,23 @@ pub(super) fn risen(code: i32, hysteresis: &Hysteresis, actuation: &Actuation, s
         Some(RateModel::DynamicPreisach { tables, table_of_leg, .. }) => of_legs(tables, table_of_leg),
         _ => [0.0; LEGS],
     };
-    Some(Rest { drive, displacement: of_legs(&hysteresis.tables, &hysteresis.table_of_leg), rate })
+    let displacement = of_legs(&hysteresis.tables, &hysteresis.table_of_leg);
+    let Some(RateModel::BoucWen { legs }) = &hysteresis.rate else {
+        return Some(Rest { drive, displacement, rate, bouc_wen: None });
+    };
+    // As the runtime, in small steps of the drive.
+    const STEPS: u32 = 4096;
+    let at_rest = |leg: usize| {
+        let (own, step) = (&legs[leg], drive / f64::from(STEPS));
+        let rate = |z: f64| own.slope - if z < 0.0 { own.back } else { own.onward } * z;
+        let lost = (0..STEPS).fold(own.rest, |z, _| z + step * rate(z + 0.5 * step * rate(z)));
+        let p = displacement[leg] - (lost - own.rest);
+        let h = own.inverse.iter().rev().fold(0.0, |sum, c| (sum + c) * p);
+        [displacement[leg], scalar.round(lost), scalar.round(h)]
+    };
+    let all: [[f64; 3]; LEGS] = core::array::from_fn(at_rest);
+    let parts = all.map(|[still, lost, _]| [still, lost]);
+    Some(Rest { drive, displacement: all.map(|[.., h]| h), rate, bouc_wen: Some(parts) })
 }
 
 /// E(`drive`, 0), with the roundings of `specgen_runtime::Grid::rising`. `nodes` as in [`Hysteresis::tables`].

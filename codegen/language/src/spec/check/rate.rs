@@ -66,6 +66,22 @@ pub(super) fn creep_lists(f: &Fields, findings: &mut Findings) -> Option<()> {
     Some(())
 }
 
+/// A model other than the Preisach table has its own creep.
+pub(super) fn model_without_rate(f: &Fields, findings: &mut Findings) -> Option<()> {
+    let path = "hysteresis.rate";
+    let (model, rate) = (f.choice("hysteresis.model")?, f.choice(path)?);
+    if model != "preisach" && rate != "static" {
+        findings.add(
+            codes::RATE_KEYS,
+            path,
+            f.span(path),
+            format!("model = \"{model}\" has its own creep, and cannot be used with rate = \"{rate}\""),
+            "remove `rate` and its keys, or write model = \"preisach\"".to_owned(),
+        );
+    }
+    Some(())
+}
+
 pub(super) fn dead_time_of_legs(f: &Fields, findings: &mut Findings) -> Option<()> {
     control::there(f)?;
     let path = "hysteresis.dead_time";

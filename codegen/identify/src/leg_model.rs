@@ -1,0 +1,164 @@
+//! A leg model chosen from the record: families of models fitted to one record, and the choice among them.
+//!
+//! ```text
+//! P = Σ f_i(p_i) − A z + c₀        p_i: plays of the drive;  dz = du (1 − s β z − γ |z|),  s = sign du      V, µm
+//! P = G(h)                         polynomial, rises over the travel
+//! y = h + c Σ L_j h                creep of one level c at fixed time constants, a decade apart
+//! ```
+//! A family is a choice of parts; today's Everett table is one, too. All are fitted by variable projection (Golub and
+//! Pereyra 1973): only c, β, γ and the first z are searched, the rest is non-negative least squares inside. The start of
+//! the creep is free. Plays become a table: E(a, b) is what they gain on the way from b to a.
+//!
+//! Families are compared in displacement on whole curves that were held out, in folds. The simplest one whose error is
+//! within one standard error of the best, or a fifth of its error, is chosen; the Everett table is the simplest.
+
+mod families;
+mod family;
+mod file;
+mod fit;
+
+use serde::{Deserialize, Serialize};
+
+use crate::everett::EverettTable;
+use crate::least_squares;
+
+pub use families::{Choice, FamilyScore, choose};
+pub use family::Family;
+pub use file::{read_leg_csv, write_leg_csv};
+
+/// Coefficients of a read-out.
+const READ_OUT: usize = 5;
+/// Most creep operators, as `hysteresis.creep_times`.
+const MOST_CREEP_TERMS: usize = 6;
+
+/// What is around the table of a leg: the line `# leg-model` of its file. See the module for the equations; there z is in
+/// units of the drive, here it is A z.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Around {
+    /// G from rest: coefficients of h, h², …, µm^(1−k).
+    pub read_out: [f64; READ_OUT],
+    /// h at full drive, µm: G rises from 0 to here.
+    pub travel_um: f64,
+    /// A: what the Bouc-Wen state takes of a small step, µm/V; 0 without one.
+    #[serde(rename = "slope_um_per_V")]
+    pub slope: f64,
+    /// β, 1/V.
+    #[serde(rename = "beta_per_V")]
+    pub beta: f64,
+    /// γ, 1/V.
+    #[serde(rename = "gamma_per_V")]
+    pub gamma: f64,
+    /// A z at rest, µm.
+    pub rest_um: f64,
+    /// Time constant (s) and weight of each creep operator.
+    pub creep: Vec<[f64; 2]>,
+}
+
+impl Around {
+    /// Share of the travel beyond its ends where the read-out is used.
+    pub const MARGIN: f64 = 0.02;
+
+    /// Of a table alone.
+    #[must_use]
+    pub fn of_table(table: &EverettTable) -> Self {
+        let travel_um = table.node(table.grid, 0) * 1e6;
+        let read_out = [1.0, 0.0, 0.0, 0.0, 0.0];
+        Self { read_out, travel_um, slope: 0.0, beta: 0.0, gamma: 0.0, rest_um: 0.0, creep: Vec::new() }
+    }
+
+    /// Itself, if a controller can run it.
+    ///
+    /// # Errors
+    /// What is wrong with a value.
+    pub fn checked(self) -> Result<Self, String> {
+        let positive = self.travel_um > 0.0 && self.slope >= 0.0 && self.creep.len() <= MOST_CREEP_TERMS;
+        let saturates = self.slope == 0.0 || self.beta + self.gamma > 0.0;
+        let creeps = self.creep.iter().all(|[time, weight]| *time > 0.0 && (0.0..1.0).contains(weight));
+        if !(positive && saturates && creeps) {
+            return Err(format!(
+                "travel_um > 0, slope_um_per_V >= 0, beta + gamma > 0 and at most {MOST_CREEP_TERMS} creep operators \
+                 with times > 0 and weights from 0 to 1 are expected"
+            ));
+        }
+        match self.inverse() {
+            Some(_) => Ok(self),
+            None => Err("the read-out does not rise over its travel".to_owned()),
+        }
+    }
+
+    /// G at `h`, µm.
+    #[must_use]
+    pub fn read_out(&self, h: f64) -> f64 {
+        self.read_out.iter().rev().fold(0.0, |sum, c| (sum + c) * h)
+    }
+
+    /// The range of h where the read-out is used, µm.
+    #[must_use]
+    pub fn range(&self) -> [f64; 2] {
+        [-Self::MARGIN * self.travel_um, (1.0 + Self::MARGIN) * self.travel_um]
+    }
+
+    /// G⁻¹ as a polynomial of the same degree, by least squares over the range; and its largest error, µm. None if G does
+    /// not rise there.
+    #[must_use]
+    pub fn inverse(&self) -> Option<([f64; READ_OUT], f64)> {
+        const POINTS: usize = 64;
+        let [low, high] = self.range();
+        let (middle, half) = (0.5 * (low + high), 0.5 * (high - low));
+        // Ascending, densest at the ends.
+        let angle = |k: usize| core::f64::consts::PI * (k as f64 + 0.5) / POINTS as f64;
+        let h: Vec<f64> = (0..POINTS).map(|k| middle - half * libm::cos(angle(k))).collect();
+        let p: Vec<f64> = h.iter().map(|h| self.read_out(*h)).collect();
+        if p.windows(2).any(|pair| pair[1] <= pair[0]) {
+            return None;
+        }
+        let unit = p[POINTS - 1];
+        let scaled: Vec<f64> = p.iter().map(|p| p / unit).collect();
+        let mut columns: Vec<Vec<f64>> = vec![scaled.clone()];
+        for k in 1..READ_OUT {
+            columns.push(columns[k - 1].iter().zip(&scaled).map(|(power, p)| power * p).collect());
+        }
+        let columns: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
+        let fit = least_squares::fit(&columns, &h)?;
+        let mut inverse = [0.0; READ_OUT];
+        let mut power = 1.0;
+        for (own, c) in inverse.iter_mut().zip(&fit.coefficients) {
+            power *= unit;
+            *own = c / power;
+        }
+        let worst = fit.residual.iter().fold(0.0, |most: f64, r| if r.abs() > most { r.abs() } else { most });
+        Some((inverse, worst))
+    }
+
+    /// The state A z after the drive has gone by `step` (V), µm: the runtime's equation in small steps.
+    #[must_use]
+    pub fn lost(&self, from: f64, step: f64) -> f64 {
+        const STEPS: usize = 4096;
+        let du = step / STEPS as f64;
+        let rate = |z: f64| {
+            let along = if du < 0.0 { -z } else { z };
+            self.slope - if along < 0.0 { self.beta - self.gamma } else { self.beta + self.gamma } * along
+        };
+        (0..STEPS).fold(from, |z, _| z + du * rate(z + 0.5 * du * rate(z)))
+    }
+}
+
+/// Displacement at full drive of legs with these tables, m.
+#[must_use]
+pub fn strokes(tables: &[EverettTable], around: &[Option<Around>]) -> Vec<f64> {
+    let of = |(k, table): (usize, &EverettTable)| match around.get(k) {
+        Some(Some(around)) => around.travel_um * 1e-6,
+        _ => table.node(table.grid, 0),
+    };
+    tables.iter().enumerate().map(of).collect()
+}
+
+/// A leg: its table and what is around it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LegModel {
+    /// Γ, m.
+    pub table: EverettTable,
+    /// The rest; none in the Preisach model.
+    pub around: Option<Around>,
+}

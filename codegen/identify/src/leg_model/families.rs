@@ -1,0 +1,361 @@
+//! The families, their errors on curves that were held out, and the choice.
+
+use serde::Serialize;
+use specgen_numerics::nnls;
+
+use super::family::{Family, TIMES};
+use super::fit::{Problem, Samples, Shape, Solution, of_play, play, thresholds};
+use super::{Around, LegModel, READ_OUT};
+use crate::branches::Branch;
+use crate::everett::EverettTable;
+use crate::findings::Findings;
+use crate::normal::{self, Weighting};
+use crate::record::Record;
+use crate::regressor::{self, Plane};
+use crate::staircase::Staircase;
+use crate::statistics::{mean, mean_and_error};
+use crate::{Identification, dead_time, grid_choice, identify, prior, selection};
+use specgen_language::diagnostic::{Diagnostic, codes};
+use specgen_language::model::LegModelKind as Kind;
+
+/// Most samples of a record in the fits; a longer one is decimated evenly.
+const SAMPLES: usize = 12_000;
+/// Branches shorter than this share of the range are not scored: they show how the record began.
+const SCORED: f64 = 0.1;
+/// Share of the least error by which a simpler family other than the table may be worse: that is below the noise of most gauges.
+const WORTHWHILE: f64 = 0.2;
+/// Fewer folds give no estimate of the spread.
+const FEWEST_FOLDS: usize = 3;
+
+/// Error of a family on curves that were held out.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct FamilyScore {
+    /// The family.
+    pub family: Family,
+    /// Root mean square over all folds, each branch without its mean, m.
+    pub held_out_rms: f64,
+    /// Standard error of the difference to the best family over the folds, m; 0 for the best one.
+    pub standard_error: f64,
+}
+
+/// The choice of a leg model.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Choice {
+    /// The chosen family.
+    pub family: Family,
+    /// Its model, fitted to all curves.
+    pub model: LegModel,
+    /// Every family that was compared.
+    pub scores: Vec<FamilyScore>,
+    /// The Everett table of the record.
+    pub table: Identification,
+}
+
+/// Fits the families that `kind` permits to `record` and chooses one; `options` as in [`identify`].
+///
+/// # Errors
+/// As [`identify`]; E0622 if the curves turn back at too few voltages to hold any out.
+pub fn choose(record: &Record, options: &crate::Options, kind: Kind) -> Result<Choice, Vec<Diagnostic>> {
+    let table = identify(record, options)?;
+    if kind == Kind::Preisach {
+        let family = Family { kind, creep: false };
+        let model = LegModel { table: table.table.clone(), around: None };
+        return Ok(Choice { family, model, scores: Vec::new(), table });
+    }
+    let mut findings = Findings::after(&record.shown_as, &table.warnings);
+    let found = chosen(record, options, kind, &table, &mut findings);
+    let ((family, model, scores), warnings) = findings.conclude(found)?;
+    Ok(Choice { family, model, scores, table: Identification { warnings, ..table } })
+}
+
+/// A family fitted to all samples, and to all but each fold.
+struct Candidate {
+    family: Family,
+    model: Option<LegModel>,
+    /// Mean square of the samples held out, of each fold, µm².
+    squares: Vec<f64>,
+}
+
+fn chosen(
+    record: &Record,
+    options: &crate::Options,
+    kind: Kind,
+    table: &Identification,
+    findings: &mut Findings,
+) -> Option<(Family, LegModel, Vec<FamilyScore>)> {
+    let plane = Plane { grid: options.grid, range: options.drive };
+    let used = selection::usable(record, &plane, findings)?;
+    let (fold_of, folds, levels) = grid_choice::deal(record, &used.branches, options.drive);
+    if folds < FEWEST_FOLDS {
+        let message = format!(
+            "the curves turn back at {levels} different voltages; the choice of a leg model needs at least {}",
+            FEWEST_FOLDS + 1
+        );
+        let help = "write hysteresis.model = \"preisach\", or record curves that turn back at more voltages";
+        return findings.refuse(codes::GRID_NOT_CHOSEN, None, message, help);
+    }
+    let data = Data::new(record, &plane, &used, &fold_of, table.report.dead_time);
+    let mut candidates: Vec<Candidate> = Vec::new();
+    for family in Family::all().into_iter().filter(|family| kind == Kind::Auto || family.kind == kind) {
+        candidates.extend(data.candidate(family, folds));
+    }
+    candidates
+        .retain(|candidate| candidate.model.is_some() && candidate.squares.iter().all(|square| square.is_finite()));
+    let best = candidates.iter().reduce(|a, b| if mean(&b.squares) < mean(&a.squares) { b } else { a });
+    let Some(best) = best.map(|best| best.squares.clone()) else {
+        let help = "write hysteresis.model = \"preisach\"";
+        return findings.refuse(codes::NOT_DETERMINED, None, "no leg model fits the record".to_owned(), help);
+    };
+    let mut scores = Vec::new();
+    let mut chosen = None;
+    for candidate in candidates {
+        let worse: Vec<f64> = candidate.squares.iter().zip(&best).map(|(a, b)| a.sqrt() - b.sqrt()).collect();
+        let (excess, error) = mean_and_error(&worse);
+        let held_out_rms = mean(&candidate.squares).sqrt() * 1e-6;
+        scores.push(FamilyScore { family: candidate.family, held_out_rms, standard_error: error * 1e-6 });
+        // The table has to be as good as the others; among these the price decides.
+        let slack = if candidate.family.kind == Kind::Preisach { 0.0 } else { WORTHWHILE * mean(&best).sqrt() };
+        if chosen.is_none() && (excess <= error || excess <= slack) {
+            chosen = candidate.model.map(|model| (candidate.family, model));
+        }
+    }
+    let (family, model) = chosen?;
+    let model = if family.is_table() { LegModel { table: table.table.clone(), around: None } } else { model };
+    Some((family, model, scores))
+}
+
+/// A record for all families.
+struct Data<'a> {
+    record: &'a Record,
+    plane: &'a Plane,
+    /// Branches of the record and the fold of each.
+    branches: &'a [Branch],
+    fold_of: &'a [Option<usize>],
+    first: usize,
+    /// Only falls are fitted by a table.
+    falls_only: bool,
+    /// The used part at every sample, for tables, and decimated.
+    whole: Samples,
+    samples: Samples,
+    /// Index in the used part of each decimated sample.
+    kept: Vec<usize>,
+    /// Decimated samples of each branch that is scored, with its fold.
+    scored: Vec<(usize, Vec<usize>)>,
+}
+
+impl<'a> Data<'a> {
+    fn new(
+        record: &'a Record,
+        plane: &'a Plane,
+        used: &'a selection::RecordSpan,
+        fold_of: &'a [Option<usize>],
+        delay: f64,
+    ) -> Self {
+        let (first, end) = (used.first, used.end);
+        let every = (end - first).div_ceil(SAMPLES);
+        let y: Vec<f64> = dead_time::delayed(record, delay)[first..end].iter().map(|y| y * 1e6).collect();
+        let mut of_branch = vec![None; end - first];
+        for (at, branch) in used.branches.iter().enumerate() {
+            let span = branch.first - first..(branch.end - first).min(end - first);
+            of_branch[span].fill(Some(at));
+        }
+        let kept: Vec<usize> = (0..end - first).filter(|k| k % every == 0 && !record.weightless[first + k]).collect();
+        let pick = |values: &[f64]| -> Vec<f64> { kept.iter().map(|k| values[*k]).collect() };
+        let (time, drive) = (&record.time[first..end], &record.drive[first..end]);
+        let samples = Samples::new(
+            plane.range,
+            [pick(time), pick(drive), pick(&y)],
+            fold_of.to_vec(),
+            kept.iter().map(|k| of_branch[*k]).collect(),
+        );
+        let whole = Samples::new(plane.range, [time.to_vec(), drive.to_vec(), y], Vec::new(), Vec::new());
+        let least = SCORED * (plane.range[1] - plane.range[0]);
+        let scored = used.branches.iter().zip(fold_of).enumerate().filter_map(|(at, (branch, fold))| {
+            let span = (record.drive[branch.end - 1] - record.drive[branch.first]).abs();
+            let own = (0..kept.len()).filter(|k| samples.branch[*k] == Some(at)).collect();
+            (span >= least).then_some(((*fold)?, own))
+        });
+        let scored = scored.collect();
+        let falls_only = used.first_order;
+        Self { record, plane, branches: &used.branches, fold_of, first, falls_only, whole, samples, kept, scored }
+    }
+
+    fn candidate(&self, family: Family, folds: usize) -> Option<Candidate> {
+        if family.kind == Kind::Preisach {
+            return self.tables(family, folds);
+        }
+        let mut best: Option<(Problem, Solution)> = None;
+        // Bouc-Wen alone has one play, which starts where the drive is.
+        for saturated in if family.has_plays() { &[true, false][..] } else { &[false] } {
+            let problem = Problem::new(&self.samples, family, *saturated);
+            if let Some(solution) = problem.search(None, None)
+                && best.as_ref().is_none_or(|(_, best)| solution.rms < best.rms)
+            {
+                best = Some((problem, solution));
+            }
+        }
+        let (problem, solution) = best?;
+        let model = model(&problem, &solution, self.plane);
+        let squares = (0..folds).map(|fold| {
+            let held_out = problem.search(Some(&solution.shape), Some(fold));
+            held_out.map_or(f64::INFINITY, |found| self.square(fold, &found.residual))
+        });
+        let squares = squares.collect();
+        Some(Candidate { family, model, squares })
+    }
+
+    /// Everett tables, after creep of the level that plays show.
+    fn tables(&self, family: Family, folds: usize) -> Option<Candidate> {
+        let creep = if family.creep {
+            let plays = Family { kind: Kind::GeneralizedPlays, creep: true };
+            Problem::new(&self.samples, plays, true).search(None, None)?.shape.creep
+        } else {
+            0.0
+        };
+        let h = self.whole.without_creep(creep);
+        let table = self.table(&h, None)?;
+        let squares = (0..folds).map(|fold| {
+            let Some(table) = self.table(&h, Some(fold)) else { return f64::INFINITY };
+            let mut residual = Vec::with_capacity(self.kept.len());
+            let memory = Staircase::negative_saturation(self.plane.range);
+            let end = self.first + h.len();
+            let mut kept = self.kept.iter().peekable();
+            normal::each_row(memory, self.plane, &self.record.drive[..end], self.first, |k, row| {
+                if kept.next_if(|kept| **kept == k - self.first).is_some() {
+                    residual.push(regressor::evaluate(row, &table.nodes) * 1e6 - h[k - self.first]);
+                }
+            });
+            self.square(fold, &self.samples.with_creep(creep, &residual))
+        });
+        let squares = squares.collect();
+        let model = family.creep.then(|| LegModel {
+            around: Some(Around { creep: terms(creep), ..Around::of_table(&table) }),
+            table: table.clone(),
+        });
+        let model = model.or(Some(LegModel { table, around: None }));
+        Some(Candidate { family, model, squares })
+    }
+
+    /// The Everett table of `h` (µm) without the curves of fold `out`.
+    fn table(&self, h: &[f64], out: Option<usize>) -> Option<EverettTable> {
+        let kept = self.branches.iter().zip(self.fold_of);
+        let kept =
+            kept.filter(|(branch, fold)| (out.is_none() || **fold != out) && !(self.falls_only && branch.rising));
+        let branches: Vec<Branch> = kept.map(|(branch, _)| *branch).collect();
+        let weighting = if self.falls_only { Weighting::AtNodes } else { Weighting::Even };
+        let scale = 1.0 / self.record.displacement_range();
+        let fill = |k: usize, values: &mut [f64]| values[0] = h[k - self.first] * 1e-6 * scale;
+        let mut normal = normal::accumulate(self.plane, self.record, self.first, &branches, weighting, 1, fill);
+        prior::add(self.plane.grid, &mut normal.gram);
+        let solution = nnls::solve(&normal.gram, &normal.rhs[0]).ok()?;
+        Some(normal::table_of(self.plane, &solution.weights, 1.0 / scale))
+    }
+
+    /// Mean square of the held-out branches of a fold, each without its mean, µm².
+    fn square(&self, fold: usize, residual: &[f64]) -> f64 {
+        let (mut count, mut sum) = (0, 0.0);
+        for (_, own) in self.scored.iter().filter(|(of, own)| *of == fold && !own.is_empty()) {
+            let values: Vec<f64> = own.iter().map(|k| residual[*k]).collect();
+            let level = mean(&values);
+            count += values.len();
+            sum += values.iter().fold(0.0, |sum, r| sum + (r - level) * (r - level));
+        }
+        if count == 0 { f64::INFINITY } else { sum / count as f64 }
+    }
+}
+
+/// Creep operators of one level.
+fn terms(creep: f64) -> Vec<[f64; 2]> {
+    if creep > 0.0 { TIMES.map(|tau| [tau, creep]).to_vec() } else { Vec::new() }
+}
+
+/// The solution as a table and what is around it; none if it cannot be inverted.
+fn model(problem: &Problem, solution: &Solution, plane: &Plane) -> Option<LegModel> {
+    let Problem { family, unit, .. } = *problem;
+    let (weights, taken, constant, read_out) = problem.parts(&solution.values);
+    let [low, high] = plane.range;
+    let r = thresholds(family, plane.range);
+    // Σ f_i at plays that `place` gives, µm.
+    let sum = |place: &dyn Fn(f64) -> f64| {
+        let (mut sum, mut weights) = (0.0, weights.iter());
+        for r in &r {
+            of_play(family, plane.range, *r, place(*r), &mut |value| {
+                sum += value * weights.next().copied().unwrap_or(0.0);
+            });
+        }
+        sum
+    };
+    let mut table =
+        EverettTable { grid: plane.grid, drive_min: low, drive_max: high, nodes: Vec::with_capacity(plane.nodes()) };
+    let at = |k: usize| low + k as f64 * (high - low) / plane.grid as f64;
+    for up in 1..=plane.grid {
+        for down in 0..up {
+            let fallen = |r: f64| play(high, r, at(down), plane.range);
+            let gained = sum(&|r| play(fallen(r), r, at(up), plane.range)) - sum(&fallen);
+            table.nodes.push(gained * 1e-6);
+        }
+    }
+    let Shape { creep, onward, back, .. } = solution.shape;
+    let (beta, gamma) = if taken > 0.0 { (0.5 * (onward + back), 0.5 * (onward - back)) } else { (0.0, 0.0) };
+    // Coefficients of h, then about rest.
+    let mut own = [0.0; READ_OUT];
+    own[0] = read_out.iter().fold(1.0, |sum, b| sum - b);
+    let mut power = 1.0;
+    for (own, b) in own[1..].iter_mut().zip(read_out) {
+        power *= unit;
+        *own = b / power;
+    }
+    let mut around =
+        Around { read_out: own, travel_um: unit, slope: taken, beta, gamma, rest_um: 0.0, creep: terms(creep) };
+    let saturated = if taken > 0.0 { taken / onward } else { 0.0 };
+    around.rest_um = around.lost(saturated, low - high);
+    let rest = sum(&|r| low + r) - around.rest_um + constant;
+    let root = |around: &Around, p: f64| {
+        let (mut below, mut above) = (-unit, 2.0 * unit);
+        for _ in 0..60 {
+            let middle = 0.5 * (below + above);
+            if around.read_out(middle) < p { below = middle } else { above = middle }
+        }
+        0.5 * (below + above)
+    };
+    let place = root(&around, rest);
+    around.read_out = shifted(&own, place);
+    let full = table.node(plane.grid, 0) * 1e6 - (around.lost(around.rest_um, high - low) - around.rest_um);
+    around.travel_um = root(&around, full);
+    around.inverse()?;
+    // Monotone: no cell of the diagonal is flatter than the state is steep.
+    let cell = (high - low) / plane.grid as f64;
+    let steepest = if taken > 0.0 { taken * if back > 0.0 { 1.0 + back / onward } else { 1.0 } } else { 0.0 };
+    let rises = (0..plane.grid).all(|k| table.node(k + 1, k) * 1e6 > steepest * cell);
+    rises.then_some(LegModel { table, around: Some(around) })
+}
+
+/// Coefficients of the polynomial about `place`, without its value there.
+fn shifted(own: &[f64; READ_OUT], place: f64) -> [f64; READ_OUT] {
+    // Horner's scheme, once for each coefficient.
+    let mut all = [0.0; READ_OUT + 1];
+    all[1..].copy_from_slice(own);
+    for first in 0..=READ_OUT {
+        for k in (first..READ_OUT).rev() {
+            all[k] += place * all[k + 1];
+        }
+    }
+    let mut about = [0.0; READ_OUT];
+    about.copy_from_slice(&all[1..]);
+    about
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_polynomial_about_another_place_has_the_same_values() {
+        let own = [1.0, 0.5, -0.2, 0.03, 0.001];
+        let value = |c: &[f64; READ_OUT], x: f64| c.iter().rev().fold(0.0, |sum, c| (sum + c) * x);
+        let about = shifted(&own, 0.7);
+        for x in [-1.0, 0.0, 0.3, 2.0] {
+            assert!((value(&about, x) - (value(&own, 0.7 + x) - value(&own, 0.7))).abs() < 1e-12);
+        }
+    }
+}

@@ -1,0 +1,422 @@
+//! Variable projection: one family on the samples of one record.
+
+use nalgebra::DMatrix;
+use specgen_language::interrupt;
+use specgen_numerics::simplex;
+
+use super::family::{Family, TIMES};
+use crate::rate::mixed;
+use crate::staircase::saturate;
+use crate::statistics::mean;
+
+/// Plays of a family that has them.
+const PLAYS: usize = 32;
+/// Largest creep level.
+const MOST_CREEP: f64 = 0.03;
+/// Slow starts of the creep that a record may show: those of the first time constants.
+const STARTS: usize = 3;
+/// Ridge on the columns, of their mean square.
+const RIDGE: f64 = 1e-10;
+/// Evaluations of a search for each unknown: from the fixed start, and from the solution on all curves.
+const SEARCH: [usize; 2] = [45, 15];
+
+/// A record for the fit: at most some thousand samples.
+pub(super) struct Samples {
+    pub(super) range: [f64; 2],
+    /// s.
+    pub(super) time: Vec<f64>,
+    /// V.
+    pub(super) drive: Vec<f64>,
+    /// µm.
+    pub(super) y: Vec<f64>,
+    /// Fold of each branch; none is always fitted.
+    pub(super) folds: Vec<Option<usize>>,
+    /// Branch of each sample, in order; none is not fitted.
+    pub(super) branch: Vec<Option<usize>>,
+    /// Of each step and time constant: what remains of a state, and the share of the last and the present h.
+    steps: Vec<[[f64; 3]; TIMES.len()]>,
+}
+
+impl Samples {
+    pub(super) fn new(
+        range: [f64; 2],
+        [time, drive, y]: [Vec<f64>; 3],
+        folds: Vec<Option<usize>>,
+        branch: Vec<Option<usize>>,
+    ) -> Self {
+        let step = |pair: &[f64]| {
+            TIMES.map(|tau| {
+                let step = pair[1] - pair[0];
+                let decay = libm::exp(-step / tau);
+                let lag = tau / step * (1.0 - decay);
+                [decay, lag - decay, 1.0 - lag]
+            })
+        };
+        let steps = time.windows(2).map(step).collect();
+        Self { range, time, drive, y, folds, branch, steps }
+    }
+
+    /// Samples of each branch and its fold, those of fold `out` left out.
+    fn branches(&self, out: Option<usize>) -> impl Iterator<Item = (Option<usize>, core::ops::Range<usize>)> {
+        let mut first = 0;
+        let next = move || {
+            let of = self.branch.get(first)?;
+            let count = self.branch[first..].iter().take_while(|branch| *branch == of).count();
+            first += count;
+            Some((*of, first - count..first))
+        };
+        core::iter::from_fn(next)
+            .filter_map(|(of, span)| Some((self.folds[of?], span)))
+            .filter(move |(fold, _)| out.is_none() || *fold != out)
+    }
+
+    /// Mean square of `residual` over the branches that are not of fold `out`; each without its mean if it `floats`.
+    fn mean_square(&self, residual: &[f64], out: Option<usize>, floats: bool) -> f64 {
+        let squares = self.branches(out).map(|(_, span)| {
+            let values = &residual[span];
+            let level = if floats { mean(values) } else { 0.0 };
+            (values.len(), values.iter().fold(0.0, |sum, r| sum + (r - level) * (r - level)))
+        });
+        let (count, sum) = squares.fold((0, 0.0), |(count, sum), (n, square)| (count + n, sum + square));
+        sum / count as f64
+    }
+
+    /// The h whose creep of level `c` gives y; at rest at the first sample.
+    pub(super) fn without_creep(&self, c: f64) -> Vec<f64> {
+        let mut h = self.y.first().copied().unwrap_or(0.0) / (1.0 + c * TIMES.len() as f64);
+        let mut states = [h; TIMES.len()];
+        let mut all = vec![h];
+        for (step, y) in self.steps.iter().zip(&self.y[1..]) {
+            let (mut carried, mut direct) = (0.0, 1.0);
+            for (state, [decay, known, now]) in states.iter_mut().zip(step) {
+                *state = decay * *state + known * h;
+                carried += *state;
+                direct += c * now;
+            }
+            h = (y - c * carried) / direct;
+            states.iter_mut().zip(step).for_each(|(state, part)| *state += part[2] * h);
+            all.push(h);
+        }
+        all
+    }
+
+    /// y of an h that begins at rest at 0.
+    pub(super) fn with_creep(&self, c: f64, h: &[f64]) -> Vec<f64> {
+        let mut states = [0.0; TIMES.len()];
+        let mut all = vec![h[0]];
+        for (step, pair) in self.steps.iter().zip(h.windows(2)) {
+            let mut sum = 0.0;
+            for (state, [decay, known, now]) in states.iter_mut().zip(step) {
+                *state = decay * *state + known * pair[0] + now * pair[1];
+                sum += *state;
+            }
+            all.push(pair[1] + c * sum);
+        }
+        all
+    }
+}
+
+/// Searched unknowns.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Shape {
+    /// c.
+    pub(super) creep: f64,
+    /// β + γ, 1/V.
+    pub(super) onward: f64,
+    /// β − γ, 1/V.
+    pub(super) back: f64,
+    /// z at the first sample over its largest.
+    pub(super) start: f64,
+}
+
+/// A family on a record: columns that do not depend on the searched unknowns.
+pub(super) struct Problem<'a> {
+    pub(super) samples: &'a Samples,
+    pub(super) family: Family,
+    /// Largest |y|: the unit of the read-out's polynomial, µm.
+    pub(super) unit: f64,
+    /// Of each sample: the plays' columns, then 1 and the starts of the creep.
+    fixed: Vec<f64>,
+    width: usize,
+    /// Those whose coefficients are not negative.
+    bounded: usize,
+    /// Sums over the samples of each fold, and of those that are always fitted.
+    grams: Vec<DMatrix<f64>>,
+}
+
+/// A fitted family.
+pub(super) struct Solution {
+    pub(super) shape: Shape,
+    /// Coefficients: plays, A, then 1, starts, read-out.
+    pub(super) values: Vec<f64>,
+    /// Residual of every sample in displacement, µm.
+    pub(super) residual: Vec<f64>,
+    /// Root mean square of the fitted ones, µm.
+    pub(super) rms: f64,
+}
+
+/// Thresholds of the plays of a family, V.
+pub(super) fn thresholds(family: Family, range: [f64; 2]) -> Vec<f64> {
+    let count = if family.has_plays() { PLAYS } else { 1 };
+    (0..count).map(|k| 0.5 * (range[1] - range[0]) * k as f64 / PLAYS as f64).collect()
+}
+
+/// Columns of a play at `p` with threshold `r`: p itself, or the integrals of the three Bernstein polynomials of degree 2
+/// over its range, which rise.
+pub(super) fn of_play(family: Family, range: [f64; 2], r: f64, p: f64, write: &mut impl FnMut(f64)) {
+    if !family.is_cubic() {
+        return write(p - range[0]);
+    }
+    let (low, length) = (range[0] + r, range[1] - range[0] - 2.0 * r);
+    let s = (p - low) / length;
+    let (s2, s3) = (s * s, s * s * s);
+    write(length * (s - s2 + s3 / 3.0));
+    write(length * (s2 - 2.0 / 3.0 * s3));
+    write(length * s3 / 3.0);
+}
+
+/// A play of threshold `r` at `p` after the drive has gone to `u`, within its range.
+pub(super) fn play(p: f64, r: f64, u: f64, range: [f64; 2]) -> f64 {
+    saturate(saturate(p, [u - r, u + r]), [range[0] + r, range[1] - r])
+}
+
+impl<'a> Problem<'a> {
+    /// `saturated`: the plays begin as after a fall from the highest drive, not as built.
+    pub(super) fn new(samples: &'a Samples, family: Family, saturated: bool) -> Self {
+        let range = samples.range;
+        let r = thresholds(family, range);
+        let first = samples.drive[0];
+        let start = |r: &f64| play(first + if saturated { *r } else { 0.0 }, *r, first, range);
+        let mut plays: Vec<f64> = r.iter().map(start).collect();
+        let starts = if family.creeps() && !family.floats() { STARTS } else { 0 };
+        let bounded = r.len() * if family.is_cubic() { 3 } else { 1 };
+        let width = bounded + 1 + starts;
+        let mut fixed = Vec::with_capacity(width * samples.time.len());
+        for (u, t) in samples.drive.iter().zip(&samples.time) {
+            interrupt::point();
+            for (p, r) in plays.iter_mut().zip(&r) {
+                *p = play(*p, *r, *u, range);
+                of_play(family, range, *r, *p, &mut |value| fixed.push(value));
+            }
+            fixed.push(1.0);
+            fixed.extend(TIMES[..starts].iter().map(|tau| libm::exp((samples.time[0] - t) / tau)));
+        }
+        let folds = samples.folds.iter().flatten().fold(0, |most, fold| if *fold < most { most } else { fold + 1 });
+        let mut grams = vec![DMatrix::zeros(width, width); folds + 1];
+        for (fold, span) in samples.branches(None) {
+            let gram = &mut grams[fold.unwrap_or(folds)];
+            let level = level(&fixed[span.start * width..span.end * width], width, family);
+            for row in fixed[span.start * width..span.end * width].chunks_exact(width) {
+                let centred: Vec<f64> = row.iter().zip(&level).map(|(value, level)| value - level).collect();
+                for (c, value) in centred.iter().enumerate() {
+                    gram.column_mut(c).iter_mut().zip(&centred).for_each(|(sum, other)| *sum += value * other);
+                }
+            }
+        }
+        let unit = samples.y.iter().fold(0.0, |most: f64, y| if y.abs() > most { y.abs() } else { most });
+        Self { samples, family, unit, fixed, width, bounded, grams }
+    }
+
+    /// z, V, at each sample.
+    fn state(&self, shape: &Shape) -> Vec<f64> {
+        let mut z = shape.start / shape.onward;
+        let mut before = self.samples.drive[0];
+        let advance = |u: &f64| {
+            z = advanced(z, *u - before, shape);
+            before = *u;
+            z
+        };
+        self.samples.drive.iter().map(advance).collect()
+    }
+
+    /// Fits the linear unknowns to the samples that are not of fold `out`: coefficients, and the residual of every sample
+    /// in displacement, µm.
+    fn solve(&self, shape: &Shape, out: Option<usize>) -> Option<(Vec<f64>, Vec<f64>)> {
+        let samples = self.samples;
+        let h = samples.without_creep(shape.creep);
+        let state = if self.family.has_state() { self.state(shape) } else { Vec::new() };
+        let states = usize::from(self.family.has_state());
+        let powers = self.family.powers();
+        // Own columns of a sample: −z, then those of the read-out, then h itself.
+        let count = states + powers + 1;
+        let own = |k: usize, row: &mut Vec<f64>| {
+            row.clear();
+            row.extend(state.get(k).map(|z| -z));
+            let x = h[k] / self.unit;
+            let mut power = x;
+            for _ in 0..powers {
+                power *= x;
+                row.push(self.unit * (x - power));
+            }
+            row.push(h[k]);
+        };
+        let (mut cross, mut square) = (vec![0.0; count * self.width], vec![0.0; count * count]);
+        let mut row = Vec::new();
+        for (_, span) in samples.branches(out) {
+            let mut all = Vec::with_capacity(count * span.len());
+            for k in span.clone() {
+                own(k, &mut row);
+                all.extend(&row);
+            }
+            let level = level(&all, count, self.family);
+            let fixed = self.fixed[span.start * self.width..span.end * self.width].chunks_exact(self.width);
+            // One centred factor is enough.
+            for (fixed, own) in fixed.zip(all.chunks_exact(count)) {
+                for (a, (value, level)) in own.iter().zip(&level).enumerate() {
+                    let value = value - level;
+                    let sums = &mut cross[a * self.width..(a + 1) * self.width];
+                    sums.iter_mut().zip(fixed).for_each(|(sum, other)| *sum += value * other);
+                    let sums = &mut square[a * count..(a + 1) * count];
+                    sums.iter_mut().zip(own).for_each(|(sum, other)| *sum += value * other);
+                }
+            }
+        }
+        // In the order of the solution, a fixed column or an own one.
+        let size = self.width + count - 1;
+        let place = |k: usize| match k {
+            k if k < self.bounded => Ok(k),
+            k if k < self.bounded + states => Err(k - self.bounded),
+            k if k < self.width + states => Ok(k - states),
+            k => Err(k - self.width),
+        };
+        let fixed_gram = |r: usize, c: usize| {
+            let parts = self.grams.iter().enumerate().filter(|(fold, _)| out != Some(*fold));
+            parts.fold(0.0, |sum, (_, gram)| sum + gram[(r, c)])
+        };
+        let mut gram = DMatrix::from_fn(size, size, |r, c| match (place(r), place(c)) {
+            (Ok(r), Ok(c)) => fixed_gram(r, c),
+            (Ok(f), Err(o)) | (Err(o), Ok(f)) => cross[o * self.width + f],
+            (Err(r), Err(c)) => square[r * count + c],
+        });
+        let target = |k: usize| match place(k) {
+            Ok(f) => cross[(count - 1) * self.width + f],
+            Err(o) => square[(count - 1) * count + o],
+        };
+        // The column of 1 vanishes within branches that float.
+        let one = self.bounded + states;
+        let vanishes = |k: usize| k == one && self.family.floats();
+        let length = |k: usize| if !vanishes(k) && gram[(k, k)] > 0.0 { gram[(k, k)].sqrt() } else { f64::INFINITY };
+        let scale: Vec<f64> = (0..size).map(|k| 1.0 / length(k)).collect();
+        let energy = square[count * count - 1].sqrt();
+        let rhs: Vec<f64> = (0..size).map(|k| target(k) * scale[k] / energy).collect();
+        for r in 0..size {
+            for c in 0..size {
+                gram[(r, c)] *= scale[r] * scale[c];
+            }
+            gram[(r, r)] += if scale[r] > 0.0 { RIDGE } else { 1.0 };
+        }
+        let mut values = mixed::solve(&gram, &rhs, self.bounded + states).ok()?;
+        values.iter_mut().zip(&scale).for_each(|(value, scale)| *value *= scale * energy);
+        let mut residual = Vec::with_capacity(h.len());
+        for (k, fixed) in self.fixed.chunks_exact(self.width).enumerate() {
+            own(k, &mut row);
+            let mut sum = -h[k];
+            for (at, value) in values.iter().enumerate() {
+                sum += value * place(at).map_or_else(|o| row[o], |f| fixed[f]);
+            }
+            residual.push(sum);
+        }
+        let offset = if self.family.floats() { mean(&residual) } else { 0.0 };
+        values[one] -= offset;
+        for (r, h) in residual.iter_mut().zip(&h) {
+            *r = (*r - offset) / self.steepness(&values, *h);
+        }
+        Some((values, samples.with_creep(shape.creep, &residual)))
+    }
+
+    /// dP/dh at `h`, at least a tenth.
+    fn steepness(&self, values: &[f64], h: f64) -> f64 {
+        let x = h / self.unit;
+        let (mut sum, mut power) = (1.0, x);
+        for (k, b) in (2..).zip(&values[values.len() - self.family.powers()..]) {
+            sum += b * (f64::from(k) * power - 1.0);
+            power *= x;
+        }
+        if sum > 0.1 { sum } else { 0.1 }
+    }
+
+    /// Searches the unknowns, from `near` or from the fixed start, over the samples that are not of fold `out`.
+    pub(super) fn search(&self, near: Option<&Shape>, out: Option<usize>) -> Option<Solution> {
+        let range = self.samples.range[1] - self.samples.range[0];
+        let start = near.copied().unwrap_or(Shape {
+            creep: if self.family.creeps() { 5e-3 } else { 0.0 },
+            onward: 5.0 / range,
+            back: 1.0 / range,
+            start: -0.3,
+        });
+        let of = |unknowns: &[f64]| {
+            let (creep, rest) = match (self.family.creeps(), unknowns) {
+                (true, [c, rest @ ..]) => (saturate(*c * 1e-2, [0.0, MOST_CREEP]), rest),
+                (_, rest) => (0.0, rest),
+            };
+            let [onward, share, begun] = *rest else { return Shape { creep, ..start } };
+            let onward = saturate(libm::exp(onward), [0.5, 500.0]) / range;
+            let share = saturate(share, [-0.95, 3.0]);
+            Shape { creep, onward, back: share * onward, start: saturate(begun, [-1.0, 1.0]) }
+        };
+        let (mut unknowns, mut steps) = (Vec::new(), Vec::new());
+        let fine = if near.is_some() { 0.1 } else { 1.0 };
+        if self.family.creeps() {
+            unknowns.push(start.creep * 1e2);
+            steps.push(0.3 * fine);
+        }
+        if self.family.has_state() {
+            unknowns.extend([libm::log(start.onward * range), start.back / start.onward, start.start]);
+            steps.extend([0.4, 0.3, 0.4].map(|step| step * fine));
+        }
+        let best = if unknowns.is_empty() {
+            start
+        } else {
+            let most = SEARCH[usize::from(near.is_some())] * unknowns.len();
+            let cost = |unknowns: &[f64]| {
+                self.solve(&of(unknowns), out)
+                    .map_or(f64::INFINITY, |(_, found)| self.samples.mean_square(&found, out, self.family.floats()))
+            };
+            of(&simplex(&unknowns, &steps, most, cost).0)
+        };
+        let (values, residual) = self.solve(&best, out)?;
+        let rms = self.samples.mean_square(&residual, out, self.family.floats()).sqrt();
+        Some(Solution { shape: best, values, residual, rms })
+    }
+
+    /// Coefficients of a solution: of the plays, A (0 without a state), of 1, of the read-out.
+    pub(super) fn parts<'s>(&self, values: &'s [f64]) -> (&'s [f64], f64, f64, &'s [f64]) {
+        let (plays, rest) = values.split_at(self.bounded);
+        let (taken, rest) = if self.family.has_state() { (rest[0], &rest[1..]) } else { (0.0, rest) };
+        (plays, taken, rest[0], &rest[self.width - self.bounded..])
+    }
+}
+
+/// Mean of each of `width` columns over a branch, which the fit leaves out of a family that floats.
+fn level(rows: &[f64], width: usize, family: Family) -> Vec<f64> {
+    let mut level = vec![0.0; width];
+    if !family.floats() {
+        return level;
+    }
+    for row in rows.chunks_exact(width) {
+        level.iter_mut().zip(row).for_each(|(sum, value)| *sum += value);
+    }
+    let count = (rows.len() / width) as f64;
+    level.iter_mut().for_each(|sum| *sum /= count);
+    level
+}
+
+/// z after a step of the drive, V: exact on either side of 0.
+fn advanced(z: f64, step: f64, shape: &Shape) -> f64 {
+    let direction = if step < 0.0 { -1.0 } else { 1.0 };
+    let (mut along, mut left) = (direction * z, step.abs());
+    if along < 0.0 {
+        let slope = 1.0 - shape.back * along;
+        let to_zero = if shape.back == 0.0 { -along } else { libm::log(slope) / shape.back };
+        if to_zero >= left {
+            return direction * (along + slope * grown(shape.back, left));
+        }
+        (along, left) = (0.0, left - to_zero);
+    }
+    direction * (along + (1.0 - shape.onward * along) * grown(shape.onward, left))
+}
+
+/// ∫ e^(−rate s) ds from 0 to `way`.
+fn grown(rate: f64, way: f64) -> f64 {
+    if rate == 0.0 { way } else { -libm::expm1(-rate * way) / rate }
+}

@@ -1,0 +1,133 @@
+//! Motion that does not repeat: random, raster and spiral, with the Preisach table and with a leg model chosen from the same records.
+
+use std::f64::consts::TAU;
+
+use host_sim::plant::LegParameters;
+use host_sim::platform::{PlatformParameters, Specimen};
+use host_sim::trajectory::{PoseTarget, PoseTrajectory};
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::{Rng, SeedableRng};
+use specgen_tests::{length, skipped};
+
+use super::bench::{Bench, DAMPED};
+
+/// One sine of an axis: axis, amplitude (m), angular frequency (rad/s), phase.
+type Line = (usize, f64, f64, f64);
+
+/// A sum of sines that is faded in and out.
+struct Sines {
+    lines: Vec<Line>,
+}
+
+impl Sines {
+    const FADE: f64 = 0.1;
+    const DURATION: f64 = 1.2;
+    /// Largest displacement of an axis, m.
+    const SIZE: f64 = 7.5e-6;
+
+    /// 0 to 20 Hz in x, y and z, rms a third of the size.
+    fn random(seed: u64) -> Self {
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let mut unit = || (random.next_u64() >> 11) as f64 / (1_u64 << 53) as f64;
+        let lines = (0..3).flat_map(|axis| (1..=40).map(move |k| (axis, 0.5 * f64::from(k))));
+        let amplitude = Self::SIZE / 3.0 * (2.0_f64 / 40.0).sqrt();
+        Self { lines: lines.map(|(axis, f)| (axis, amplitude, TAU * f, TAU * unit())).collect() }
+    }
+
+    /// Ten lines a second in x: a triangle without its harmonics above the ninth; one slow stroke in y.
+    fn raster() -> Self {
+        let harmonics = [1.0, 3.0, 5.0, 7.0, 9.0].into_iter().enumerate().map(|(k, n)| {
+            let sign = if k % 2 == 0 { 1.0 } else { -1.0 };
+            (0, sign * Self::SIZE * 0.81 / (n * n), TAU * 5.0 * n, 0.0)
+        });
+        Self { lines: harmonics.chain([(1, Self::SIZE, TAU * 0.4, 0.0)]).collect() }
+    }
+
+    /// 20 Hz in x and y, from the middle to the full radius and back.
+    fn spiral() -> Self {
+        let slow = 1.0 / Self::DURATION;
+        let lines = [(0, TAU / 4.0), (1, 0.0)].into_iter().flat_map(|(axis, phase)| {
+            // (1 − cos)/2 times a sine.
+            [(0.5, 20.0), (-0.25, 20.0 - slow), (-0.25, 20.0 + slow)]
+                .map(|(share, f)| (axis, share * Self::SIZE, TAU * f, phase))
+        });
+        Self { lines: lines.collect() }
+    }
+
+    /// Fade, and its first two derivatives by time.
+    fn fade(time: f64) -> [f64; 3] {
+        let (inward, sign) = if time > 0.5 * Self::DURATION { (Self::DURATION - time, -1.0) } else { (time, 1.0) };
+        if inward >= Self::FADE {
+            return [1.0, 0.0, 0.0];
+        }
+        let (u, per_second) = (inward.max(0.0) / Self::FADE, 1.0 / Self::FADE);
+        [
+            u.powi(3) * (10.0 - 15.0 * u + 6.0 * u * u),
+            sign * per_second * 30.0 * u * u * (1.0 - u) * (1.0 - u),
+            per_second * per_second * 60.0 * u * (1.0 - u) * (1.0 - 2.0 * u),
+        ]
+    }
+}
+
+impl PoseTrajectory for Sines {
+    fn duration(&self) -> f64 {
+        Self::DURATION
+    }
+
+    fn target(&self, time: f64) -> PoseTarget {
+        let [fade, rate, bend] = Self::fade(time);
+        let mut target = PoseTarget::default();
+        for (axis, a, angular, phase) in &self.lines {
+            let (s, c) = (angular * time + phase).sin_cos();
+            target.pose[*axis] += a * fade * s;
+            target.rate[*axis] += a * (rate * s + fade * angular * c);
+            target.acceleration[*axis] += a * (bend * s + 2.0 * rate * angular * c - fade * angular * angular * s);
+        }
+        target
+    }
+}
+
+/// nm rms of the norm: random, raster, spiral.
+fn errors(bench: &Bench) -> [f64; 3] {
+    let (scenario, mut controller) = (bench.scenario(), bench.controller());
+    [Sines::random(7), Sines::raster(), Sines::spiral()]
+        .map(|path| scenario.run(&mut controller, &path).unwrap().errors.rms_translation_nm())
+}
+
+fn bench(name: &str, leg: &LegParameters, model: &str) -> Bench {
+    let legs = Specimen::within_tolerances(&PlatformParameters::reference(), leg, 1);
+    let model = format!("memory  = 64\nmodel   = \"{model}\"");
+    Bench::new(name, legs, &[("memory  = 64", &model), DAMPED])
+}
+
+fn shown(what: &str, errors: [f64; 3]) -> [f64; 3] {
+    let [random, raster, spiral] = errors;
+    println!("{what}: random {random:.1} nm, raster {raster:.1} nm, spiral {spiral:.1} nm");
+    errors
+}
+
+#[test]
+fn a_bouc_wen_leg_with_the_model_of_its_own_curves_follows_what_does_not_repeat() {
+    let leg = LegParameters::bouc_wen();
+    let modelled = shown("Bouc-Wen, auto", errors(&bench("non-repeating-bouc-auto", &leg, "auto")));
+    let bars = [6.0, 6.0, 8.0];
+    assert!(modelled.iter().zip(bars).all(|(error, bar)| *error <= bar), "{modelled:?}");
+    if length(true, false) {
+        return skipped("only in the full run: the table in its place, and the other classes");
+    }
+    let table = shown("Bouc-Wen, table", errors(&bench("non-repeating-bouc-table", &leg, "preisach")));
+    assert!(modelled.iter().zip(table).all(|(model, table)| 3.0 * model < table), "{modelled:?} {table:?}");
+}
+
+#[test]
+#[ignore = "long: records of twelve legs, six families each"]
+fn the_other_classes_are_no_worse_with_the_model_that_is_chosen() {
+    let mut widening = LegParameters::reference();
+    widening.creep_thresholds_v = vec![0.0];
+    for (name, leg) in [("plays", LegParameters::reference()), ("widening", widening)] {
+        let [table, auto] = ["preisach", "auto"].map(|model| {
+            shown(&format!("{name}, {model}"), errors(&bench(&format!("non-repeating-{name}-{model}"), &leg, model)))
+        });
+        assert!(auto.iter().zip(table).all(|(auto, table)| *auto <= 1.05 * table), "{name}: {auto:?} {table:?}");
+    }
+}
