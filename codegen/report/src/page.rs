@@ -254,10 +254,10 @@ impl Page {
             } else {
                 String::new()
             };
+            // Its name is that of the picture that the script draws in it.
             let _ = writeln!(
                 self.out,
-                "<figure class=\"plot\" tabindex=\"0\" role=\"button\" aria-label=\"{}\"{style}>{caption}</figure>",
-                escaped(title)
+                "<figure class=\"plot\" tabindex=\"0\" role=\"button\"{style}>{caption}</figure>"
             );
         }
         self.out.push_str("</div>\n</div>\n");
