@@ -78,7 +78,9 @@ fn is_accessible(folder: &Folder, name: &str) {
         support::VIOLATIONS
     );
     let page = folder.read(name);
-    folder.write("axe.html", &format!("{page}<script>{axe}</script><script>addEventListener('load', () => {{ {check} }});</script>"));
+    folder.write("axe.js", axe);
+    let scripts = "<script src=\"axe.js\"></script><script>addEventListener('load', () => {";
+    folder.write("axe.html", format!("{page}{scripts} {check} }});</script>"));
     for width in [1280, 390] {
         let Some(drawn) = drawn(&folder.path("axe.html"), width) else {
             return support::skipped("no chromium: the page is not drawn");

@@ -407,6 +407,11 @@ impl Panel {
         if message.kind == "ok" && status.status & BUSY == 0 {
             message = self.rest.message(rules, model);
         }
+        if message.kind == "ok" && self.known["differ"].as_array().is_some_and(|names| !names.is_empty()) {
+            message.kind = "warning";
+            message.what = "Running. Settings differ from the spec.".to_owned();
+            message.advice = "Restore those of the spec, or write these into it.";
+        }
         if let Some(before) = self.published.replace(current) {
             if before.0 != current.0 {
                 self.clients.note(

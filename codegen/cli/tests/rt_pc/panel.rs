@@ -253,7 +253,9 @@ fn pages_operate_a_machine_one_is_in_control_and_a_page_that_leaves_is_a_host_th
     let gains = first.done(json!({ "do": "gain", "factor": 0.5 }));
     assert!(gains["gain_ratio_limit"].as_f64().unwrap() > 1.1, "{gains}");
     // Settings that differ from the spec are named until they are restored.
-    first.wait("changed gains", |state| state["known"]["differ"].as_array().is_some_and(|names| names.contains(&json!("kp"))));
+    first.wait("changed gains", |state| {
+        state["known"]["differ"].as_array().is_some_and(|names| names.contains(&json!("kp")))
+    });
     first.done(json!({ "do": "restore" }));
     first.wait("the gains of the spec", |state| state["known"]["differ"] == json!([]));
     for line in ["config write x.toml", "record download /tmp/x", "stop", "wait 5", "fly"] {

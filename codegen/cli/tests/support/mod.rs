@@ -261,7 +261,8 @@ pub fn axe() -> Option<String> {
 }
 
 /// An expression for a browser with the script of [`axe`]: a promise of one line for each rule that the page violates.
-pub const VIOLATIONS: &str = "axe.run().then(run => run.violations.map(v => `${v.impact} ${v.id}: ${v.nodes.map(n => n.target)}`).join('\n'))";
+pub const VIOLATIONS: &str =
+    "axe.run().then(run => run.violations.map(v => `${v.impact} ${v.id}: ${v.nodes.map(n => n.target)}`).join('\n'))";
 
 /// Cross compiler and emulator; none, with a message, if one is missing and not required.
 pub fn tools() -> Option<Tools> {

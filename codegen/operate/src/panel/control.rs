@@ -109,7 +109,12 @@ pub(super) fn carry_out<P: Port + 'static>(
         PageRequest::Restore { .. } => {
             let settings = panel.borrow().compiled.ir.integrity.settings.clone();
             operator.configure(&settings, |name| format!("the device refused `{name}` of the spec"))?;
-            panel.borrow_mut().clients.note("note", &format!("Page {page} restored the settings of the spec."), "", None);
+            panel.borrow_mut().clients.note(
+                "note",
+                &format!("Page {page} restored the settings of the spec."),
+                "",
+                None,
+            );
             Ok(Value::Null)
         }
         PageRequest::Download { .. } => {

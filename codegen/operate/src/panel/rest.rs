@@ -51,7 +51,10 @@ impl RestError {
         let limits = (0..6).flat_map(|axis| {
             let explained = 1.0 / rules.steadiness.per_limit[axis];
             let required = model.requirements.noise_of(axis);
-            [required, Some((explained, "supervisor.disturbance"))].into_iter().flatten().map(move |limit| (axis, limit))
+            [required, Some((explained, "supervisor.disturbance"))]
+                .into_iter()
+                .flatten()
+                .map(move |limit| (axis, limit))
         });
         let worst = limits
             .map(|(axis, (limit, key))| (rms[axis] / limit, axis, limit, key))

@@ -64,7 +64,7 @@
       if (!message.ok) note("warning", message.why + (/[.!]$/.test(message.why) ? "" : "."));
       if (then) then(message);
     } else if (message.k === "end") { ended = message.why; state = null; }
-    else if (message.k === "lost") { lost = message; state = left = null; stated = performance.now(); say({ do: "seen", number: sent }); controls(); }
+    else if (message.k === "lost") { lost = message; state = left = null; stated = performance.now(); say({ do: "seen", number: sent }); controls(); allow(by("hold"), "", "sent when the link is back"); }
     else {
       const now = performance.now();
       stated = now;
@@ -205,7 +205,7 @@
     chip.textContent = known ? state.phase : "–";
     if (!link || lost) blank();
     if (ended) put("error", "The panel was stopped.", ended);
-    else if (link && lost) put("error", "No link to the machine.", "Reconnecting. Use the hardware stop if the machine must stop." + (lost.why ? " Last attempt: " + lost.why + "." : ""));
+    else if (link && lost) put("error", "No link to the machine.", "Reconnecting. Use the hardware stop if the machine must stop." + (lost.why ? " (" + lost.why + ")" : ""));
     else if (!link) put("error", "No link to the panel.", "Use the hardware stop if the machine must stop.", state ? "" : "connecting");
     else if (left) put("warning", "The controlling page is gone.", "The machine holds" + (left.left > 0 ? ", and ramps down in " + left.left.toFixed(0) + "\u2009s" : " or is at rest") + ". Hold, Ramp down and Request control work from here.");
     else if (age > STALE) put("error", "No data for " + (isFinite(age) ? duration(age / 1000) : "any time") + ".", "Readouts are blank until data arrive.");

@@ -174,9 +174,15 @@ impl Window {
     /// violation. At 200 %, a window of 1280 px has 640 CSS pixels.
     fn fits(&mut self, state: &str) {
         let axe = support::axe();
-        for (width, height, scale) in
-            [(320, 640, 1), (390, 844, 1), (640, 400, 2), (720, 450, 2), (1280, 800, 1), (1440, 900, 1), (2560, 1440, 1)]
-        {
+        for (width, height, scale) in [
+            (320, 640, 1),
+            (390, 844, 1),
+            (640, 400, 2),
+            (720, 450, 2),
+            (1280, 800, 1),
+            (1440, 900, 1),
+            (2560, 1440, 1),
+        ] {
             let size = json!({ "width": width, "height": height, "deviceScaleFactor": scale, "mobile": false });
             self.ask(SIZE, size);
             // The charts are drawn again.
@@ -278,7 +284,9 @@ pub fn a_browser_draws_it(panel: &Panel) {
     }
     // Hold and Ramp down have the keyboard focus like any button; Esc ramps down from the watching page, and closes a dialog.
     for id in ["hold", "down"] {
-        let focus = format!("(b => (b.focus(), document.activeElement === b && b.tabIndex === 0))(document.getElementById('{id}'))");
+        let focus = format!(
+            "(b => (b.focus(), document.activeElement === b && b.tabIndex === 0))(document.getElementById('{id}'))"
+        );
         assert_eq!(page.value(&focus), true, "{id}");
     }
     page.click("check");
