@@ -14,8 +14,7 @@ use super::branches::Branch;
 use super::findings::Findings;
 use super::least_squares::{dot, fit, mean_square};
 use super::normal::{self, Step, Weighting};
-use super::rate::predict::later;
-use super::record::Record;
+use super::record::{Record, later};
 use super::regressor::{self, Plane};
 use super::staircase::{Staircase, saturate};
 use super::statistics::{Line, mean, median, median_interval, rates};
@@ -32,6 +31,8 @@ const SAMPLES: usize = 100_000;
 /// Longest spike, s: the half width of the neighbourhood, which has these least and most samples.
 const WIDTH: f64 = 1.5e-3;
 const NEAR: [f64; 2] = [12.0, 100.0];
+/// A spike may always have so many samples.
+const FEW: usize = 3;
 /// A defect is this many times what [`USUAL`] of the samples stay below, and [`ALONE`] times what three quarters of its
 /// surroundings (in half widths) stay below.
 const BEYOND: f64 = 6.0;
@@ -181,13 +182,15 @@ fn spikes(record: &mut Record, residual: &mut Residual, half: usize, least: f64,
         let from = (0..peak).rev().take_while(flank).last().unwrap_or(peak);
         found.push((from, (peak..off.len()).take_while(flank).last().unwrap_or(peak) + 1));
     }
+    // What is longer is an error of the model.
+    found.retain(|(from, end)| end - from <= FEW || record.time[first + end - 1] - record.time[first + from] <= WIDTH);
     residual.drop_gathered(&mut found, |defect| *defect, half);
     for &(from, end) in &found {
         let most = off[from..end].iter().fold(0.0, |most: f64, x| if x.abs() > most.abs() { *x } else { most });
-        for k in from..end {
-            record.displacement[first + k] -= off[k];
+        for (k, error) in (from..end).zip(&off[from..end]) {
+            record.displacement[first + k] -= error;
             record.weightless[first + k] = true;
-            residual.rest[k] -= off[k];
+            residual.rest[k] -= error;
         }
         let message = format!(
             "from {} s to {} s the displacement is off the model by up to {:.3} um: these {} samples get no weight",
@@ -312,7 +315,7 @@ fn hum(record: &mut Record, plane: &Plane, residual: &Residual, size: f64, findi
     if let Some((frequency, amplitude)) = shared(record, plane, residual, &tried)
         && amplitude > SHARED * size
     {
-        let help = "record again at another rate: hum cannot be told from hysteresis at a frequency of the drive";
+        let help = "record again at another rate: at a frequency of the drive, hum and hysteresis look the same";
         let what = hum_of(amplitude, frequency);
         let message = format!("{what}, near a frequency of the drive, or an error in step with it: it is in the fit");
         findings.add(codes::RECORD_HUM, None, message, help);

@@ -158,6 +158,25 @@ fn finish(
     Ok(Record { shown_as, time, drive, monitored: false, displacement, weightless, simulated: false, warnings })
 }
 
+/// `values` at each `time` − `delay` (s), interpolated; the first value before the beginning.
+pub(crate) fn later(time: &[f64], values: &[f64], delay: f64) -> Vec<f64> {
+    let mut next = 0;
+    let at = |wanted: f64| {
+        while next < time.len() && time[next] <= wanted {
+            next += 1;
+        }
+        match next.checked_sub(1) {
+            None => values[0],
+            Some(before) if next < time.len() => {
+                let share = (wanted - time[before]) / (time[next] - time[before]);
+                values[before] + share * (values[next] - values[before])
+            }
+            Some(before) => values[before],
+        }
+    };
+    time.iter().map(|t| t - delay).map(at).collect()
+}
+
 #[cfg(test)]
 #[path = "record/tests/files.rs"]
 mod files;

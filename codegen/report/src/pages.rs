@@ -128,8 +128,8 @@ pub fn run(options: &Options, ui: &mut Ui) -> Result<(), Failure> {
     let board = compiled.model.target.mcu.part().board;
     let title = format!("report for {board}");
     let mut head = head(&compiled.source.display_name, &compiled.ir.digest, &title, command);
-    head.versions =
-        format!("specgen {} · f{} · {board}", env!("CARGO_PKG_VERSION"), compiled.ir.scalar.bits());
+    let of_numbers = format!("f{}", compiled.ir.scalar.bits());
+    head.versions = [concat!("specgen ", env!("CARGO_PKG_VERSION")), &of_numbers, board].join(" · ");
     head.other = paper.as_deref().map(|path| [file_name(path), "Comparison with the paper".to_owned()]);
     let mut page = write(&output, &head, &first, &sections, &behind)?;
     page.verdict = Some(crate::verdict::Sentence::of(&verdict).verdict);

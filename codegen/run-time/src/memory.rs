@@ -74,7 +74,7 @@ macro_rules! models {
             tables: &[Nodes<'static, T>; LEGS],
             creep: [&[f64]; 3],
             direct: f64,
-        ) -> Result<([Table<T>; LEGS], [Memory<T>; LEGS]), InvalidIr> {
+        ) -> Result<LegModels<T>, InvalidIr> {
             $(
                 if let [Some(gains), Some(weights), Some(carried)] = creep.map(<[f64; $count]>::from_slice) {
                     let creep = Creep {
@@ -95,7 +95,7 @@ macro_rules! models {
             convert: &Convert<T>,
             tables: &[Nodes<'static, T>; LEGS],
             legs: &[ir::BoucWen; LEGS],
-        ) -> Result<([Table<T>; LEGS], [Memory<T>; LEGS]), InvalidIr> {
+        ) -> Result<LegModels<T>, InvalidIr> {
             $(
                 let around: Option<Vec<_>> = legs.iter().map(|leg| leg.constants::<T, $terms>(convert)).collect();
                 if let Some(around) = around {
@@ -189,11 +189,11 @@ impl<T: Real + Debug> LegMemory<T, Table<T>> for Memory<T> {
     }
 }
 
+/// Table and memory of each leg.
+type LegModels<T> = ([Table<T>; LEGS], [Memory<T>; LEGS]);
+
 /// The table of each leg, and its memory after a sweep to the highest voltage and back.
-pub fn models<T: Real>(
-    convert: &Convert<T>,
-    h: &Hysteresis,
-) -> Result<([Table<T>; LEGS], [Memory<T>; LEGS]), InvalidIr> {
+pub fn models<T: Real>(convert: &Convert<T>, h: &Hysteresis) -> Result<LegModels<T>, InvalidIr> {
     let tables = nodes(convert, h, &h.tables, &h.table_of_leg)?;
     Ok(match &h.rate {
         None => (tables.map(Table::Static), [Memory::Static(ReversalMemory::new()); LEGS]),

@@ -10,7 +10,7 @@ use crate::cause::{self, Cause};
 use crate::distrust::{JUMP, settling};
 use crate::everett::EverettTable;
 use crate::findings::Findings;
-use crate::record::{self, Record};
+use crate::record::{self, Record, later};
 use crate::regressor::Plane;
 use crate::signals::{self, Input};
 use crate::staircase::Staircase;
@@ -253,25 +253,6 @@ pub fn predict(model: &RateModel, drive: &Drive) -> Result<Prediction, Vec<Diagn
         measured,
         keep,
     })
-}
-
-/// `values` at each `time` − `delay` (s), interpolated; the first value before the beginning.
-pub(crate) fn later(time: &[f64], values: &[f64], delay: f64) -> Vec<f64> {
-    let mut next = 0;
-    let at = |wanted: f64| {
-        while next < time.len() && time[next] <= wanted {
-            next += 1;
-        }
-        match next.checked_sub(1) {
-            None => values[0],
-            Some(before) if next < time.len() => {
-                let share = (wanted - time[before]) / (time[next] - time[before]);
-                values[before] + share * (values[next] - values[before])
-            }
-            Some(before) => values[before],
-        }
-    };
-    time.iter().map(|t| t - delay).map(at).collect()
 }
 
 /// Whether each sample from `first` on is `settling` (s) clear of a step of the drive of more than `jump` (V).

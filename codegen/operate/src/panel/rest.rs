@@ -58,7 +58,7 @@ impl RestError {
         });
         let worst = limits
             .map(|(axis, (limit, key))| (rms[axis] / limit, axis, limit, key))
-            .filter(|(part, ..)| !(*part <= 1.0))
+            .filter(|(part, ..)| *part > 1.0 || part.is_nan())
             .max_by(|a, b| a.0.total_cmp(&b.0));
         let Some((_, axis, limit, key)) = worst else {
             return said("ok", "Running. Nothing to do.".to_owned(), "");
