@@ -40,7 +40,7 @@ const SPARE: f64 = 0.7;
 /// The same for the estimates alone, whose grid of frequencies is coarser than that of the check.
 const SPARE_OF_ESTIMATES: f64 = 0.9;
 /// A suspected mode may be off by this share of its frequency: the check of the whole loop looks at intervals beside it, too.
-const SUSPECT_OFF: f64 = 0.1;
+const SUSPECT_OFF: f64 = 0.12;
 
 /// Gains and weights in the loop of one mode.
 #[derive(Debug, Clone, Copy)]
@@ -72,8 +72,8 @@ pub(super) struct Family<'a> {
     corners: Vec<Vec<Complex>>,
     /// The corners with each structural mode that is known but not part of the plant.
     suspects: Vec<Vec<Complex>>,
-    /// The same with frequencies off by [`SUSPECT_OFF`].
-    off: Vec<Vec<Complex>>,
+    /// The border of stability about each of them.
+    about: Vec<FlexureRange>,
     /// With the distance of [`WITH_STRUCTURE`], and the border of stability itself.
     range: Option<FlexureRange>,
     pub(super) bare_range: Option<FlexureRange>,
@@ -149,18 +149,20 @@ impl<'a> Family<'a> {
                 RATIO.map(|ratio| one.iter().map(|[re, im]| [ratio * re, ratio * im]).collect())
             })
             .collect();
-        let with = |demand: &StructureDemand, share: f64| -> Vec<Vec<Complex>> {
+        let suspects = demand.map_or_else(Vec::new, |demand| {
             let with = |channel: &StructuralChannel, plant: &Vec<Complex>| {
-                let frequency = share * channel.frequency;
-                let factor = |angle: &f64| channel.flexure.factor(angle / period / frequency, channel.damping_ratio);
+                let factor =
+                    |angle: &f64| channel.flexure.factor(angle / period / channel.frequency, channel.damping_ratio);
                 plant.iter().zip(&angles).map(|(p, angle)| times(*p, factor(angle))).collect()
             };
             demand.suspects.iter().flat_map(|one| corners.iter().map(move |plant| with(one, plant))).collect()
+        });
+        let about = |one: &StructuralChannel| {
+            let (hertz, off) = (one.frequency / (2.0 * PI), 1.0 + SUSPECT_OFF);
+            let mut range = FlexureRange::new(hertz / off, SPARE * one.damping_ratio, vec![one.flexure], 0.0);
+            range.to = hertz * off;
+            range
         };
-        let suspects = demand.map_or_else(Vec::new, |demand| with(demand, 1.0));
-        let off = [1.0 / (1.0 + SUSPECT_OFF), 1.0 + SUSPECT_OFF];
-        let off =
-            demand.map_or_else(Vec::new, |demand| off.into_iter().flat_map(|share| with(demand, share)).collect());
         let open = |angle: &f64| {
             let ratio = angle / (frequency * period);
             let (re, im) = (1.0 - ratio * ratio, 2.0 * damping * ratio);
@@ -188,7 +190,7 @@ impl<'a> Family<'a> {
             nominal,
             corners,
             suspects,
-            off,
+            about: demand.map_or_else(Vec::new, |demand| demand.suspects.iter().map(about).collect()),
             range: demand.map(|demand| demand.range(1.0 / WITH_STRUCTURE, 1.0)),
             bare_range: demand.map(|demand| demand.range(0.0, SPARE_OF_ESTIMATES)),
             spare_range: demand.map(|demand| demand.range(0.0, SPARE)),
@@ -276,13 +278,14 @@ impl<'a> Family<'a> {
         Controller { response, cancelled }
     }
 
-    /// Penalty for what makes a loop unstable: a corner, or a structural mode of the range.
+    /// Penalty for what makes a loop unstable: a corner, a structural mode of the range, or one that is suspected.
     pub(super) fn penalty(&self, Controller { response, cancelled }: &Controller, range: Option<&FlexureRange>) -> f64 {
         let mut penalty = 0.0;
-        let suspects = self.off.iter().map(|plant| (plant, None));
-        for (plant, range) in self.corners.iter().map(|plant| (plant, range)).chain(suspects) {
-            let found = tolerance(plant, response, cancelled, &self.hertz, range);
-            penalty += if found.stable { DEPTH * found.depth } else { UNSTABLE };
+        for plant in &self.corners {
+            for range in range.into_iter().chain(&self.about) {
+                let found = tolerance(plant, response, cancelled, &self.hertz, Some(range));
+                penalty += if found.stable { DEPTH * found.depth } else { UNSTABLE };
+            }
         }
         penalty
     }
@@ -305,7 +308,9 @@ impl<'a> Family<'a> {
         };
         let worst = largest(&self.corners, self.range.as_ref());
         let suspected = largest(&self.suspects, None);
-        largest(&self.off, None);
+        for about in &self.about {
+            largest(&self.corners, Some(about));
+        }
         let mut slow = [0.0; 3];
         let (mut nominal, mut compliance, mut noise, mut fast) = (0.0, 0.0, 0.0, 0.0);
         let mut tracking = [0.0; 3];
