@@ -148,8 +148,6 @@ impl Flexure {
 pub struct FlexureRange {
     /// Lowest f_n, in the unit of the loop's frequencies.
     pub from: f64,
-    /// Highest f_n; infinite if not given.
-    pub to: f64,
     /// Least ζ.
     pub damping_ratio: f64,
     /// Where a mode may act.
@@ -172,7 +170,7 @@ impl FlexureRange {
             [distance * cos, distance * sin]
         };
         let points = if distance > 0.0 { Self::POINTS } else { 1 };
-        Self { from, to: f64::INFINITY, damping_ratio, flexures, distances: (0..points).map(point).collect() }
+        Self { from, damping_ratio, flexures, distances: (0..points).map(point).collect() }
     }
 
     /// How far a mode within the range would have to change until |1 + L·factor| is no longer below the distance at this frequency:
@@ -186,12 +184,10 @@ impl FlexureRange {
                     continue;
                 }
                 let Some([ratio, damping]) = flexure.border(loop_gain, *distance) else { continue };
-                if ratio * frequency <= self.from || ratio * frequency >= self.to || damping <= self.damping_ratio {
+                if ratio * frequency <= self.from || damping <= self.damping_ratio {
                     continue;
                 }
                 let above = Self::STEEP * libm::log(ratio * frequency / self.from);
-                let below = Self::STEEP * libm::log(self.to / (ratio * frequency));
-                let above = if below < above { below } else { above };
                 let damped = libm::log(damping / self.damping_ratio);
                 let found = if above < damped { above } else { damped };
                 if found > depth.most {

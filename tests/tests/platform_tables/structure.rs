@@ -92,7 +92,7 @@ fn any_single_mode_of_the_default_range_is_borne() {
 #[ignore = "long: three ranges on two classes of legs"]
 fn every_range_is_borne_on_both_classes_of_legs() {
     for (from, follows, grows, settles) in
-        [("600", 0.93, 1.6, 18.0), ("900", 0.85, 1.5, 12.0), ("1200", 0.77, 1.1, 12.0)]
+        [("600", 1.1, 1.6, 18.0), ("900", 0.85, 1.5, 15.0), ("1200", 0.85, 1.1, 15.0)]
     {
         let edits = edits(from);
         let edits = edits.each_ref().map(|(from, to)| (*from, to.as_str()));

@@ -14,11 +14,11 @@ use specgen_runtime::Law;
 /// Number of frequencies below, around and above the mode.
 const POINTS: [u32; 3] = [40, 80, 60];
 /// Target of the largest |S|: over the corners, and with a structural mode.
-const SENSITIVITY: f64 = 1.98;
-const WITH_STRUCTURE: f64 = 2.46;
+const SENSITIVITY: f64 = 1.95;
+const WITH_STRUCTURE: f64 = 2.4;
 /// Target of the compliance peak, relative to that without feedback: of modes up to [`LOW`] times the lowest, and of others.
 const COMPLIANCE: [f64; 2] = [0.48, 1.0];
-pub(super) const LOW: f64 = 1.3;
+const LOW: f64 = 1.3;
 /// Frequencies at which |S| of slow motion is compared with that of the start rule: the lowest mode over these.
 pub const SLOW: [f64; 3] = [36.0, 7.2, 3.6];
 /// Target of |S| at the first of them, relative to the start rule.
@@ -28,19 +28,14 @@ const FAST: f64 = 1.0;
 const FAST_FROM: f64 = 0.4;
 /// Weights of tracking and of compliance.
 const TRACKING: f64 = 8.0;
-const STIFF: f64 = 8.0;
-/// Shares of the error power of a path with corners under the start rule: hysteresis, whose power falls with f⁻⁴; corners, alike at all
-/// frequencies up to the mode; and ringing at the mode. Simulated, hysteresis has 0.07 on legs of plays and 0.8 on Bouc-Wen legs.
-const SHARES: [f64; 3] = [0.3, 0.3, 0.4];
+const STIFF: f64 = 2.0;
+/// Share of the error power of a path with corners that rings at the modes, under the start rule; the rest is slow.
+const RINGING: f64 = 0.25;
 /// Penalties for an unstable corner, and for the depth of a border in the range of structural modes.
 const UNSTABLE: f64 = 1000.0;
 const DEPTH: f64 = 20.0;
 /// Share of the least ζ to which the sections alone are designed: with gains, the loop of one mode is not the whole.
 const SPARE: f64 = 0.7;
-/// The same for the estimates alone, whose grid of frequencies is coarser than that of the check.
-const SPARE_OF_ESTIMATES: f64 = 0.9;
-/// A suspected mode may be off by this share of its frequency: the check of the whole loop looks at intervals beside it, too.
-const SUSPECT_OFF: f64 = 0.12;
 
 /// Gains and weights in the loop of one mode.
 #[derive(Debug, Clone, Copy)]
@@ -72,8 +67,6 @@ pub(super) struct Family<'a> {
     corners: Vec<Vec<Complex>>,
     /// The corners with each structural mode that is known but not part of the plant.
     suspects: Vec<Vec<Complex>>,
-    /// The border of stability about each of them.
-    about: Vec<FlexureRange>,
     /// With the distance of [`WITH_STRUCTURE`], and the border of stability itself.
     range: Option<FlexureRange>,
     pub(super) bare_range: Option<FlexureRange>,
@@ -101,8 +94,8 @@ pub(super) struct Figures {
     pub(super) compliance: f64,
     most_compliance: f64,
     pub(super) slow: [f64; 3],
-    /// Power of each of [`SHARES`].
-    tracking: [f64; 3],
+    /// Power of slow errors and of ringing.
+    tracking: [f64; 2],
     noise: f64,
     /// Largest |C| at high frequency.
     fast: f64,
@@ -111,17 +104,18 @@ pub(super) struct Figures {
 impl Figures {
     /// Error on a path with corners over that of `rule`.
     pub(super) fn tracking(&self, rule: &Self) -> f64 {
-        libm::sqrt((0..SHARES.len()).map(|k| SHARES[k] * self.tracking[k] / rule.tracking[k]).sum())
+        let [slow, ringing] = core::array::from_fn(|k| self.tracking[k] / rule.tracking[k]);
+        libm::sqrt((1.0 - RINGING) * slow + RINGING * ringing)
     }
 
     pub(super) fn cost(&self, rule: &Self) -> f64 {
         let over = |value: f64, bound: f64| if value > bound { value - bound } else { 0.0 };
         let value = UNSTABLE * self.unstable as f64
-            + 100.0 * over(self.sensitivity[1], SENSITIVITY)
-            + 100.0 * over(self.suspected, WITH_STRUCTURE)
+            + 20.0 * over(self.sensitivity[1], SENSITIVITY)
+            + 20.0 * over(self.suspected, WITH_STRUCTURE)
             + DEPTH * self.depth
-            + 200.0 * over(self.compliance, self.most_compliance)
-            + 5.0 * over(self.slow[0] / rule.slow[0], SLOWEST)
+            + 20.0 * over(self.compliance, self.most_compliance)
+            + 100.0 * over(self.slow[0], SLOWEST * rule.slow[0])
             + 20.0 * over(self.noise, rule.noise)
             + 3.0 * over(self.fast, FAST)
             + TRACKING * self.tracking(rule)
@@ -157,12 +151,6 @@ impl<'a> Family<'a> {
             };
             demand.suspects.iter().flat_map(|one| corners.iter().map(move |plant| with(one, plant))).collect()
         });
-        let about = |one: &StructuralChannel| {
-            let (hertz, off) = (one.frequency / (2.0 * PI), 1.0 + SUSPECT_OFF);
-            let mut range = FlexureRange::new(hertz / off, SPARE * one.damping_ratio, vec![one.flexure], 0.0);
-            range.to = hertz * off;
-            range
-        };
         let open = |angle: &f64| {
             let ratio = angle / (frequency * period);
             let (re, im) = (1.0 - ratio * ratio, 2.0 * damping * ratio);
@@ -190,9 +178,8 @@ impl<'a> Family<'a> {
             nominal,
             corners,
             suspects,
-            about: demand.map_or_else(Vec::new, |demand| demand.suspects.iter().map(about).collect()),
             range: demand.map(|demand| demand.range(1.0 / WITH_STRUCTURE, 1.0)),
-            bare_range: demand.map(|demand| demand.range(0.0, SPARE_OF_ESTIMATES)),
+            bare_range: demand.map(|demand| demand.range(0.0, 0.98)),
             spare_range: demand.map(|demand| demand.range(0.0, SPARE)),
             slow: slow.map(place),
             width,
@@ -278,14 +265,13 @@ impl<'a> Family<'a> {
         Controller { response, cancelled }
     }
 
-    /// Penalty for what makes a loop unstable: a corner, a structural mode of the range, or one that is suspected.
+    /// Penalty for what makes a loop unstable: a corner, or a structural mode of the range.
     pub(super) fn penalty(&self, Controller { response, cancelled }: &Controller, range: Option<&FlexureRange>) -> f64 {
         let mut penalty = 0.0;
-        for plant in &self.corners {
-            for range in range.into_iter().chain(&self.about) {
-                let found = tolerance(plant, response, cancelled, &self.hertz, Some(range));
-                penalty += if found.stable { DEPTH * found.depth } else { UNSTABLE };
-            }
+        let suspects = self.suspects.iter().map(|plant| (plant, None));
+        for (plant, range) in self.corners.iter().map(|plant| (plant, range)).chain(suspects) {
+            let found = tolerance(plant, response, cancelled, &self.hertz, range);
+            penalty += if found.stable { DEPTH * found.depth } else { UNSTABLE };
         }
         penalty
     }
@@ -308,12 +294,10 @@ impl<'a> Family<'a> {
         };
         let worst = largest(&self.corners, self.range.as_ref());
         let suspected = largest(&self.suspects, None);
-        for about in &self.about {
-            largest(&self.corners, Some(about));
-        }
         let mut slow = [0.0; 3];
         let (mut nominal, mut compliance, mut noise, mut fast) = (0.0, 0.0, 0.0, 0.0);
-        let mut tracking = [0.0; 3];
+        let mut tracking = [0.0; 2];
+        let lowest = self.of.basis.frequencies[0] / core::f64::consts::TAU;
         let stable = sensitivity(&self.nominal, response, cancelled, |k, s| {
             if s > nominal {
                 nominal = s;
@@ -329,11 +313,9 @@ impl<'a> Family<'a> {
             let gain = square(response[k]) / square(cancelled[k]);
             // T = P C S.
             noise += self.width[k] * square(self.nominal[k]) * gain * s;
-            let open = self.open[k];
-            let weights = [1.0 / libm::pow(self.hertz[k], 4.0), if open < 1.0 { open } else { 1.0 }, open];
-            for (power, weight) in tracking.iter_mut().zip(weights) {
-                *power += self.width[k] * s * weight;
-            }
+            let relative = self.hertz[k] / lowest;
+            tracking[0] += self.width[k] * s / (relative * relative);
+            tracking[1] += self.width[k] * s * self.open[k];
             if self.delay[k][0] < libm::cos(FAST_FROM * PI) && gain > fast {
                 fast = gain;
             }
