@@ -167,7 +167,7 @@ fn a_glitch_gets_no_weight_and_is_named_with_its_time() {
 /// Sixteen curves at 2 and 8 kV/s in turn, at 10 kHz, on the same table; dead time 0.3 ms, noise 2 nm.
 fn late(defect: impl FnOnce(&mut [f64])) -> Identification {
     let curve = |drive: Drive, k: u32| {
-        let slope = if k % 2 == 0 { 2000.0 } else { 8000.0 };
+        let slope = if k.is_multiple_of(2) { 2000.0 } else { 8000.0 };
         drive.ramp(6.25 * f64::from(k), slope).ramp(0.0, slope)
     };
     let drive = (1..=16).fold(Drive::at(0.0, 1e4).hold(0.05), curve);

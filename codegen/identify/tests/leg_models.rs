@@ -1,5 +1,7 @@
 //! The family of a leg, chosen from its reversal curves.
 
+#![allow(clippy::unwrap_used, clippy::panic)] // Helpers of tests, where a panic is a failed test.
+
 use std::time::Instant;
 
 use host_sim::forc::ReversalExperiment;
