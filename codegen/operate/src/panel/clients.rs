@@ -62,10 +62,6 @@ pub enum PageRequest {
         id: u32,
         factor: f64,
     },
-    /// Sets all settings to those of the spec.
-    Restore {
-        id: u32,
-    },
     Download {
         id: u32,
     },
@@ -370,7 +366,6 @@ impl PageRequest {
             | Self::Begin { id, .. }
             | Self::Wave { id, .. }
             | Self::Gain { id, .. }
-            | Self::Restore { id }
             | Self::Download { id }
             | Self::Check { id } => *id,
             _ => 0,

@@ -19,13 +19,8 @@ use specgen_language::ui::Ui;
 /// Type number of a message with a record.
 const RECORD: u32 = 2;
 
-/// Queries health, reach of each axis, recorder, gains, and the settings that differ from those of the spec. Queries that the device
-/// does not support are omitted.
-pub(super) fn queries<P: Port>(
-    operator: &mut Operator<P>,
-    of_spec: &[u64],
-    quiet: &mut Ui,
-) -> Result<Value, SessionError> {
+/// Queries health, reach of each axis, recorder and gains. Queries that the device does not support are omitted.
+pub(super) fn queries<P: Port>(operator: &mut Operator<P>, quiet: &mut Ui) -> Result<Value, SessionError> {
     let mut known = json!({});
     let commands = [
         ("standing", Command::Status),
@@ -42,13 +37,6 @@ pub(super) fn queries<P: Port>(
             }
         }
     }
-    let words = operator.session.config()?;
-    let names = &operator.session.description().config_names;
-    let differ = names.iter().zip(words.iter().zip(of_spec)).filter(|(_, (word, of_spec))| word != of_spec);
-    // `kp[0]` to `kp[5]` are one setting for a reader.
-    let mut differ: Vec<&str> = differ.map(|(name, _)| name.split('[').next().unwrap_or(name)).collect();
-    differ.dedup();
-    known["differ"] = json!(differ);
     Ok(known)
 }
 
@@ -105,17 +93,6 @@ pub(super) fn carry_out<P: Port + 'static>(
                 None,
             );
             Ok(value)
-        }
-        PageRequest::Restore { .. } => {
-            let settings = panel.borrow().compiled.ir.integrity.settings.clone();
-            operator.configure(&settings, |name| format!("the device refused `{name}` of the spec"))?;
-            panel.borrow_mut().clients.note(
-                "note",
-                &format!("Page {page} restored the settings of the spec."),
-                "",
-                None,
-            );
-            Ok(Value::Null)
         }
         PageRequest::Download { .. } => {
             let record = operator.record()?;
