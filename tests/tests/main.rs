@@ -17,6 +17,7 @@ mod fuzz_corpus;
 mod identify_bad_input;
 mod identify_faults;
 mod identify_kinds;
+mod identify_leg_models;
 mod identify_measured;
 mod identify_mode;
 mod identify_open_loop;

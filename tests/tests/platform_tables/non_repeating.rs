@@ -118,16 +118,3 @@ fn a_bouc_wen_leg_with_the_model_of_its_own_curves_follows_what_does_not_repeat(
     let table = shown("Bouc-Wen, table", errors(&bench("non-repeating-bouc-table", &leg, "preisach")));
     assert!(modelled.iter().zip(table).all(|(model, table)| 3.0 * model < table), "{modelled:?} {table:?}");
 }
-
-#[test]
-#[ignore = "long: records of twelve legs, six families each"]
-fn the_other_classes_are_no_worse_with_the_model_that_is_chosen() {
-    let mut widening = LegParameters::reference();
-    widening.creep_thresholds_v = vec![0.0];
-    for (name, leg) in [("plays", LegParameters::reference()), ("widening", widening)] {
-        let [table, auto] = ["preisach", "auto"].map(|model| {
-            shown(&format!("{name}, {model}"), errors(&bench(&format!("non-repeating-{name}-{model}"), &leg, model)))
-        });
-        assert!(auto.iter().zip(table).all(|(auto, table)| *auto <= 1.05 * table), "{name}: {auto:?} {table:?}");
-    }
-}
