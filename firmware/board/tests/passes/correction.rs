@@ -142,7 +142,8 @@ fn a_pass_begins_in_a_machine_that_runs_at_rest_and_nowhere_else() {
     line.with(|rig| rig.exchange.report.status |= controller::GENERATOR_BUSY);
     assert_eq!(refused(&mut client, &begin), Refusal::State);
     line.with(|rig| rig.exchange.report.status &= !controller::GENERATOR_BUSY);
-    let kind = line.with(|rig| core::mem::replace(&mut rig.exchange.command.command[0], CommandKind::Trajectory.word()));
+    let kind =
+        line.with(|rig| core::mem::replace(&mut rig.exchange.command.command[0], CommandKind::Trajectory.word()));
     assert_eq!(refused(&mut client, &begin), Refusal::State);
     line.with(|rig| rig.exchange.command.command[0] = kind);
     let words = bytes(&wave(1e-6, 5.0).to_words());
