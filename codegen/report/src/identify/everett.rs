@@ -143,7 +143,8 @@ fn families(choice: &Choice, grid: usize) -> String {
         let bytes = format!("{:>8}{mark}", score.family.bytes(grid));
         row(&mut text, &columns, &[&score.family.name(), &held_out, &error, &score.family.instructions(), &bytes]);
     }
-    text += "  the simplest within one standard error or a fifth of the best; instructions of one leg, Cortex-M7, f64, about\n";
+    text += "  chosen: the simplest within a fifth of the best; the table within one std err\n";
+    text += "  instructions of one leg on a Cortex-M7 in f64 are estimated, not measured\n";
     text
 }
 
