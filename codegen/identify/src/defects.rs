@@ -1,11 +1,12 @@
 //! Defects of a record that a fit would follow: spikes, steps of the displacement, and hum. They are repaired, and
 //! findings state them.
 //!
-//! A coarse table and a dead time are fitted first. In its residual a defect differs from the rest of the record, whatever the drive.
+//! A coarse table and a dead time are fitted first. In its residual a defect differs from the rest of the record,
+//! whatever the drive.
 //! Defects must be few: thresholds are multiples of what 95 % of the samples, and most of the neighbours, stay below.
 //! Those that gather at the reversals of the drive are errors of the model.
 //! ```text
-//! spike  a sample off the median of its neighbourhood   at most WIDTH long; no weight, replaced
+//! spike  a sample off the median of its neighbourhood   at most 1 ms; no weight, replaced
 //! step   medians before and after a sample differ       subtracted from all later samples
 //! hum    a line of the spectrum that the drive lacks    subtracted
 //! ```
@@ -28,7 +29,7 @@ use specgen_numerics::nnls;
 /// Grid of the table, and most samples in its fit; a longer record is decimated evenly.
 const GRID: usize = 16;
 const SAMPLES: usize = 100_000;
-/// Longest spike, s: the half width of the neighbourhood, which has these least and most samples.
+/// Half width of the neighbourhood, s, which has these least and most samples. A spike is at most two thirds as long.
 const WIDTH: f64 = 1.5e-3;
 const NEAR: [f64; 2] = [12.0, 100.0];
 /// A spike may always have so many samples.
@@ -182,8 +183,13 @@ fn spikes(record: &mut Record, residual: &mut Residual, half: usize, least: f64,
         let from = (0..peak).rev().take_while(flank).last().unwrap_or(peak);
         found.push((from, (peak..off.len()).take_while(flank).last().unwrap_or(peak) + 1));
     }
-    // What is longer is an error of the model.
-    found.retain(|(from, end)| end - from <= FEW || record.time[first + end - 1] - record.time[first + from] <= WIDTH);
+    // What is longer is an error of the model. Flanks may reach over the neighbourhood where such an error is beside them.
+    let lasts = |from: usize, end: usize| record.time[first + end - 1] - record.time[first + from];
+    found.retain(|&(from, end)| {
+        let height = off[from..end].iter().fold(0.0, |most, x| libm::fmax(most, x.abs()));
+        let high = off[from..end].iter().filter(|x| 3.0 * x.abs() > height).count();
+        high <= FEW || 3 * high <= 2 * half && lasts(from, end) <= 2.0 * WIDTH
+    });
     residual.drop_gathered(&mut found, |defect| *defect, half);
     for &(from, end) in &found {
         let most = off[from..end].iter().fold(0.0, |most: f64, x| if x.abs() > most.abs() { *x } else { most });
