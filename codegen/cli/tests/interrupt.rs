@@ -63,7 +63,7 @@ fn an_interrupt_leaves_nothing_half_done() {
             assert_eq!(folder.run(arguments).code, 1);
         } else {
             let run = interrupted(&folder, arguments, Signal::INT);
-            run.says(130, &["error: interrupted: there is no result; every file that is there is whole"]);
+            run.says(130, &["error: interrupted: there is no result and no partial file"]);
             assert!(!run.stderr.contains("failed"), "{run:?}");
         }
         assert!(!folder.path(left).exists(), "{arguments:?} leaves {left}");

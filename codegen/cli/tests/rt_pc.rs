@@ -458,7 +458,7 @@ fn a_record_that_finds_no_room_brings_the_machine_down(bench: &Bench) {
     let summary: Value = serde_json::from_slice(&output.stdout).unwrap();
     let failure = summary["failure"].as_str().unwrap();
     assert!(
-        output.status.code() == Some(1) && failure.contains("cut.rec: the record is not whole: File too large"),
+        output.status.code() == Some(1) && failure.contains("cut.rec: the record is incomplete: File too large"),
         "{summary}"
     );
     assert_eq!((&summary["last_phase"], &summary["lost_rows"]), (&"Disarmed".into(), &0.into()), "{summary}");

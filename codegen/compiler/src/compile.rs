@@ -36,7 +36,7 @@ pub struct Compilation {
     pub margins: Option<Margins>,
     /// Modes, tuning and margins of a controller in task space.
     pub design: Option<Design>,
-    /// Travel of the platform, and how well its legs hold it, for a controller in task space.
+    /// Reach of the platform and conditioning of its geometry, for a controller in task space.
     pub reach: Option<Reach>,
     /// What each trajectory demands of the legs, in the order of the spec.
     pub demands: Vec<PathDemand>,
@@ -44,7 +44,7 @@ pub struct Compilation {
     pub stops: Vec<Stopping>,
     /// Sensor noise of the pose, rms, m and rad, if the gauges measure the platform.
     pub pose_noise: Option<PoseNoise>,
-    /// Closed-loop noise at rest as measured, rms, m and rad.
+    /// Computed closed-loop noise of the pose at rest, as the gauges show it, rms, m and rad.
     pub rest_noise: RestNoise,
     /// Values that were not measured.
     pub assumptions: Assumptions,

@@ -58,9 +58,9 @@ pub struct Reach {
 pub struct AxisReach {
     /// Declared bound on its magnitude, m or rad.
     pub declared: f64,
-    /// Lowest and highest value from the middle of all strokes, m or rad from rest.
+    /// Lowest and highest value, from rest, with the other axes at the middle of all strokes, m or rad.
     pub from_middle: [f64; 2],
-    /// The same from the bias; from rest if there is no bias.
+    /// The same with the other axes at the bias; at rest if there is no bias.
     pub from_bias: [f64; 2],
 }
 

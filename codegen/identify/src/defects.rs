@@ -330,7 +330,7 @@ fn hum(record: &mut Record, plane: &Plane, residual: &Residual, size: f64, findi
 }
 
 fn hum_of(amplitude: f64, frequency: f64) -> String {
-    format!("the displacement holds hum of {:.1} nm at {frequency:.2} Hz", amplitude * 1e9)
+    format!("the displacement contains hum of {:.1} nm at {frequency:.2} Hz", amplitude * 1e9)
 }
 
 /// Frequency (Hz, of those `tried`) and amplitude (m) of a wave that halves the residual of table and dead time. All

@@ -34,8 +34,8 @@ pub struct GaugeCalibration {
     pub residual_max: f64,
     /// Time or line of that sample.
     pub residual_max_at: String,
-    /// Largest mean difference of the reading between falling and rising displacement; none if it never changes
-    /// direction.
+    /// Largest mean difference of the reading between falling and rising displacement, m; none if the displacement
+    /// never reverses.
     pub hysteresis: Option<f64>,
     /// Least |slope| over the voltages covered, in % of the mean slope: above 0 the calibration can be inverted.
     pub least_slope_percent: f64,
@@ -46,7 +46,7 @@ pub struct GaugeCalibration {
     pub table: Vec<[f64; 2]>,
 }
 
-/// Highest power that a spec takes.
+/// Highest degree that a spec accepts.
 const HIGHEST: usize = 5;
 /// Interleaved parts of the voltage range, each of which is held out in turn.
 const FOLDS: usize = 5;
@@ -58,7 +58,7 @@ const PER_COEFFICIENT: usize = 4;
 const KNOTS: usize = 33;
 /// Voltages at which slope and hysteresis are evaluated.
 const BINS: usize = 25;
-/// Hysteresis above this many residuals gives a warning.
+/// Hysteresis above this many times the rms residual gives a warning.
 const HYSTERESIS: f64 = 2.0;
 /// A reference range (m) outside these bounds suggests another unit.
 const PLAUSIBLE: [f64; 2] = [50e-9, 5e-3];
@@ -96,7 +96,7 @@ fn calibrate_checked(signals: &Signals, degree: Option<usize>, findings: &mut Fi
     let scaled: Vec<f64> = volts.iter().map(|v| (2.0 * v - low - high) / (high - low)).collect();
     let held_out = held_out(&scaled, &reference);
     if held_out.is_empty() {
-        let message = "the voltages are too few to hold some out".to_owned();
+        let message = "has too few different voltages for cross-validation".to_owned();
         return findings.refuse(codes::GAUGE_RECORD, None, message, "record more positions of the reference");
     }
     let degree = match degree {
@@ -127,7 +127,7 @@ fn calibrate_checked(signals: &Signals, degree: Option<usize>, findings: &mut Fi
             least.1,
             signals.place(near)
         );
-        let help = "use the gauge where its voltage rises or falls all the way, or look for a fault there";
+        let help = "use the gauge only where its voltage is monotonic, or look for a fault there";
         findings.add(codes::GAUGE_NOT_MONOTONE, Some(signals.lines.at(near)), message, help);
     }
     let worst = (0..volts.len()).fold(0, |w, k| if found.residual[k].abs() > found.residual[w].abs() { k } else { w });

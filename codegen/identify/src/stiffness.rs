@@ -162,7 +162,7 @@ fn measure_checked(signals: &Signals, findings: &mut Findings) -> Option<AxialSt
         let (low, high) = extent(force);
         let at = force.iter().position(|f| *f == high).unwrap_or(0);
         let message = format!(
-            "a stiffness of {stiffness:.3e} N/m is none of a piezo actuator (force {low} to {high} N, highest at {})",
+            "a stiffness of {stiffness:.3e} N/m is not that of a piezo actuator (force {low} to {high} N, highest at {})",
             signals.place(at)
         );
         let help = "write the force in newtons and the displacement in micrometres; are the columns swapped?";

@@ -105,7 +105,7 @@ impl Failure {
     /// Ended by Ctrl-C before there was a result.
     #[must_use]
     pub fn interrupted() -> Self {
-        let message = "interrupted: there is no result; every file that is there is whole".to_owned();
+        let message = "interrupted: there is no result and no partial file".to_owned();
         Self::Interrupted { message, result: Value::Null }
     }
 

@@ -31,7 +31,7 @@ pub struct Ui {
     json: bool,
     controller: Cell<Option<ControllerForm>>,
     findings: Vec<Value>,
-    /// Why standard output is not whole.
+    /// Reason why standard output is incomplete.
     lost: RefCell<Option<io::Error>>,
     /// The program that called the command.
     caller: Option<Caller>,
@@ -194,7 +194,7 @@ impl Ui {
             self.result(outcome);
             return Ok(());
         }
-        let message = format!("ended before the end of the path, so that there is no figure: {}", ended.join(", "));
+        let message = format!("ended before the end of the path, so there is no figure: {}", ended.join(", "));
         Err(Failure::EndedEarly { message, result: self.shown(outcome) })
     }
 
@@ -262,7 +262,7 @@ impl Ui {
     #[must_use]
     pub fn not_all_out(&self) -> Option<u8> {
         let error = self.lost.take()?;
-        say!("error: could not write to standard output: {error}; what is there of it is not whole\n");
+        say!("error: could not write to standard output: {error}; the output is incomplete\n");
         Some(ENVIRONMENT)
     }
 

@@ -87,7 +87,7 @@ class Controller:
         return dict(self._library.settings())
 
     def configure(self, **settings: float) -> None:
-        """Sets settings; others get the values of the spec. For names with an index: ``configure(**{"gain[2]": 1.0})``.
+        """Sets settings; others get the values of the spec. For names with an index: ``configure(**{"kp[2]": 2e6})``.
 
         The state is kept. Raises `Error` if a value is out of its range; the settings are then unchanged.
         """

@@ -116,8 +116,8 @@ impl<'m, G: Gauges, A: Amplifiers, L: Lines> Board<'m, G, A, L> {
         if codes == [0; CHANNELS] { Ok(()) } else { self.amplifiers.write(&codes) }
     }
 
-    /// One tick. True if it started the converters again and therefore took longer than a tick: then the schedule
-    /// starts afresh.
+    /// One tick. Returns true if it started the converters again and therefore took longer than a period: the caller
+    /// then restarts the schedule.
     ///
     /// A new request to acknowledge starts the converters again while the amplifiers are off, whatever the cause: both
     /// are tested before the amplifiers are enabled again. The supervisor gets the request in the tick after that, when no reading

@@ -40,9 +40,9 @@ impl Stopwatch {
 pub struct Report {
     /// Ticks since power-up.
     pub tick: u64,
-    /// What the machine does.
+    /// Phase of the machine.
     pub phase: Phase,
-    /// Why.
+    /// Cause of the phase, if it was forced.
     pub cause: Cause,
     /// Finding of the wiring check, if that is the cause.
     pub finding: u16,
@@ -50,11 +50,11 @@ pub struct Report {
     pub amplifier_on: bool,
     /// The controller's status word.
     pub status: u32,
-    /// Ticks that never came.
+    /// Missed ticks.
     pub missed: u32,
     /// The last tick, by [`Self::tick`], with valid gauge readings; none if there was none.
     pub measured: Option<u64>,
-    /// All else.
+    /// Counters and times.
     pub health: Counts,
 }
 
@@ -63,9 +63,9 @@ pub struct Report {
 pub struct Counts {
     /// Events since the host's last request.
     pub events: u32,
-    /// Faults of converters, and a bit for each kind.
+    /// Number of converter faults.
     pub converter_faults: u32,
-    /// See [`Self::converter_faults`].
+    /// A bit for each kind of converter fault that occurred.
     pub faults: u32,
     /// Ticks with an invalid gauge.
     pub gauge_faults: u32,

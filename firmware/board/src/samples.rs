@@ -83,7 +83,7 @@ impl SampleMemory {
 pub(crate) struct Samples {
     /// Ticks per row; 0 without a subscriber.
     pub(crate) every: u32,
-    /// Whether rows start afresh; also at power-up, when their memory is not initialised.
+    /// Whether rows restart; also at power-up, when their memory is not initialised.
     pub(crate) anew: bool,
     copies: &'static mut Copies,
     /// None while the background uses it.

@@ -41,7 +41,7 @@ impl Schedule {
 
     /// The tick starts at counter value `now`.
     pub const fn begin(&mut self, now: u32) -> DueTick {
-        // A tick before its time, by a spurious interrupt, counts as in time. A difference above a period means a long
+        // A tick before its time, by a spurious interrupt, counts as on time. A difference above a period means a long
         // stop.
         let early = self.due.wrapping_sub(now) <= self.period.get();
         let late = if early { 0 } else { now.wrapping_sub(self.due) };
@@ -51,7 +51,7 @@ impl Schedule {
         DueTick { late: late - missed * self.period.get(), missed, next: self.due }
     }
 
-    /// Starts afresh: the time since then is not counted as missed. For a tick that had to take longer.
+    /// Restarts the schedule at `now`, without missed ticks: for a tick that had to take longer than a period.
     pub const fn restart(&mut self, now: u32) -> u32 {
         self.due = now.wrapping_add(self.period.get());
         self.due

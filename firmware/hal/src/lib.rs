@@ -53,7 +53,7 @@ pub trait Gauges {
     /// complement. Blocks until they are available. The driver documents how much this time may vary.
     ///
     /// # Errors
-    /// The [`Fault`] that makes the codes invalid. The next call starts afresh.
+    /// The [`Fault`] that makes the codes invalid. The next call starts from the beginning.
     fn read(&mut self) -> Result<[i32; CHANNELS], Fault>;
 }
 

@@ -78,7 +78,7 @@ fn sift<P: Spec>(p: P, supervisor: &mut Supervisor<P::Real>, input: &MachineInpu
     sifted
 }
 
-/// The law runs; returns its status. Of the channel: the expected reading, and its target.
+/// The law runs; returns its status. `expected` and `target`: expected reading and set-point of `channel`.
 #[inline]
 fn run<P: Spec>(
     p: P,

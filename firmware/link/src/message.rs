@@ -18,8 +18,8 @@ pub enum Request<'a> {
     },
     /// Answered by [`Reply::Status`].
     Status,
-    /// The request to the supervisor from now on: the number of a `supervisor::Request`. It stays in force as long as
-    /// the link. Answered by [`Reply::Done`].
+    /// The request to the supervisor from now on: the number of a `supervisor::Request`. It stays in force while the
+    /// link is alive. Answered by [`Reply::Done`].
     Supervise {
         /// 0 none, 1 arm, 2 run, 3 hold, 4 ramp down, 5 acknowledge.
         request: u8,
@@ -146,7 +146,7 @@ pub enum PassAction {
         /// Number of the trajectory.
         trajectory: u32,
     },
-    /// End it at once; the correction fades out, the trajectory goes on.
+    /// End the pass at once; the correction fades out, the trajectory continues.
     Abort,
     /// Compute the correction of the next pass in the background, from the pass that completed and the plan that was
     /// sent after its knots.
@@ -192,7 +192,7 @@ pub enum Reply<'a> {
     Refused(Refusal),
     /// Done.
     Done,
-    /// Who is there.
+    /// Identity of the device.
     Identity(Identity),
     /// Its status.
     Status(Status),

@@ -1,7 +1,7 @@
 //! The real-time thread: read, control, write, hand over; no allocation, no lock, no file.
 //!
 //! No control decision is made here: the supervisor decides the reaction to a missed tick, an invalid gauge or a lost
-//! operator, which it gets as event bits.
+//! host, which it gets as event bits.
 
 mod keeper;
 mod setpoints;
@@ -28,8 +28,8 @@ use keeper::Keeper;
 use setpoints::Setpoints;
 
 /// From the start of the loop to its first tick, ns.
-const LEAD: u64 = 20_000_000;
-/// A machine that slept this long was suspended, ns.
+const START_DELAY: u64 = 20_000_000;
+/// A computer that slept this long was suspended, ns.
 const SLEPT: u64 = 1_000_000;
 /// Time without a sign of life of the service after which the operator's link is lost, ns. The service gives one every
 /// few ms.
@@ -76,7 +76,7 @@ impl<D: Device> Loop<'_, D> {
         let mut link = Link { number: 0, asked: 0, silence: self.timing.silence };
         let mut count = 0;
         let Timing { period, elastic, .. } = self.timing;
-        let mut planned = clock::now() + LEAD;
+        let mut planned = clock::now() + START_DELAY;
         let mut tick = 0;
         let mut slept = clock::since_boot().wrapping_sub(clock::now());
         allocation::enter();
@@ -94,7 +94,7 @@ impl<D: Device> Loop<'_, D> {
             if over > 0 {
                 events |= MISSED_TICK;
             }
-            // In a PC that sleeps this clock stops, too.
+            // While the PC sleeps, the monotonic clock stops, and no tick counts as skipped.
             if over > u64::from(STALL_TICKS) || (suspended && !elastic) {
                 events |= STALLED;
             }
@@ -144,7 +144,7 @@ impl<D: Device> Loop<'_, D> {
 
             let mut driven = Ok(());
             if enabled && !output.amplifier_on {
-                // Until it is done.
+                // Repeated in every tick until it succeeds.
                 driven = self.device.enable(false);
                 enabled = driven.is_err();
             }
@@ -153,7 +153,7 @@ impl<D: Device> Loop<'_, D> {
                 driven = driven.and(self.device.set(triggers::lines(output.tick.status)));
             }
             if output.amplifier_on && !enabled && driven.is_ok() {
-                // The codes are set before the amplifiers use them. After any answer they may be on.
+                // The codes are set before the amplifiers use them. Even after an error they may be on.
                 driven = self.device.enable(true);
                 enabled = true;
             }
@@ -207,7 +207,7 @@ impl<D: Device> Loop<'_, D> {
                 }
             }
             keeper.prepare(&machine, &self.config, count, configured);
-            // After the next tick, if there is no room now.
+            // Tried again after the next tick if there is no room now.
             if let Some(Err(rtrb::PushError::Full(player))) = setpoints.take_player().map(|player| players.push(player))
             {
                 setpoints.put_player(player);
@@ -545,7 +545,7 @@ mod tests {
                 }
             });
             let began = taken.recv().unwrap();
-            assert!(began[0] >= start + LEAD);
+            assert!(began[0] >= start + START_DELAY);
             // No tick makes up for a late one, however late that was.
             for pair in began.windows(2) {
                 assert!(pair[1] - pair[0] >= PERIOD / 2, "{began:?}");
@@ -561,7 +561,7 @@ mod tests {
     #[test]
     fn a_loop_begins_on_time() {
         on_time(|| {
-            const PERIOD: u64 = LEAD / 2;
+            const PERIOD: u64 = START_DELAY / 2;
             let timing = Timing { period: PERIOD, limit: PERIOD, silence: 1 << 40, elastic: false };
             let (bench, _) = run(timing, |bench| bench.stop());
             assert_eq!((bench.rows[0].tick, bench.rows[0].input.events), (0, 0));

@@ -44,7 +44,7 @@ pub struct Row {
     pub digest: u64,
     /// Ticks before it that were late.
     pub late: u64,
-    /// Orders taken before it.
+    /// Commands executed before it.
     pub orders: u32,
     /// A block of the record begins with it: its [`Snapshot`] was handed over before.
     pub opens: bool,
@@ -66,7 +66,7 @@ pub struct Snapshot {
     pub state: [u64; MACHINE_STATE_WORDS],
 }
 
-/// The operator's command words and request from the next tick on.
+/// Command words of the host in control, and request to the supervisor, from the next tick on.
 #[derive(Debug, Clone, Copy)]
 pub struct OperatorRequest {
     /// None if only the request changes.
@@ -74,7 +74,7 @@ pub struct OperatorRequest {
     pub request: Request,
 }
 
-/// A command for the loop, carried out between two ticks.
+/// A command for the loop, executed between two ticks.
 // The ring has room for the largest variant anyway: a box would have to be released by the real-time thread.
 #[allow(clippy::large_enum_variant)]
 #[derive(Debug)]
@@ -84,19 +84,19 @@ pub enum LoopCommand {
     /// Starts a wave, if none is under way.
     Wave(Wave),
     StopWave,
-    /// To be started at the edge, in place of another waiting command.
+    /// A command that waits for the rising edge of the input line, in place of any other.
     Await(EdgeCommand, Option<Wave>),
-    /// Nothing waits any more.
+    /// Cancels the waiting command.
     StopWaiting,
     /// Starts the pass that this player was prepared for, if no wave is under way.
     Pass(Player),
-    /// End the pass under way.
+    /// Ends the pass in progress.
     AbortPass,
     Tape(Tape),
     /// Restarts the recorder of the loop.
     Record(recorder::Settings),
     Trigger,
-    /// Stop the recorder and hand it back.
+    /// Stops the recorder and hands it back.
     StopRecorder,
 }
 
@@ -114,18 +114,19 @@ pub struct Shared {
     pub device_faults: AtomicU64,
     /// Ticks with a gauge fault.
     pub gauge_faults: AtomicU32,
-    /// Duration of a tick, from waking up to its end.
+    /// Duration of a tick, from waking up to its end, ns.
     pub tick: LastAndLongest,
-    /// Time from the readings to the outputs.
+    /// Time from the readings to the outputs, ns.
     pub output: LastAndLongest,
-    /// Delay of waking up; none if time waits for the loop.
+    /// Delay of waking up, ns; none if time waits for the loop.
     pub delay: LastAndLongest,
     /// Ticks that ended after the planned time of the next one.
     pub overruns: AtomicU32,
 }
 
 impl Shared {
-    /// Times at which a tick was planned, woken, read, written and done. If time waits for the loop, nothing is late.
+    /// Times at which a tick was planned, woken, read, written and done, and the period, ns. If time waits for the
+    /// loop, nothing is late.
     pub fn record_tick(&self, [planned, woken, read, written, done]: [u64; 5], period: u64, elastic: bool) {
         self.tick.add(done.saturating_sub(woken));
         self.output.add(written.saturating_sub(read));

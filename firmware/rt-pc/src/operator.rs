@@ -1,8 +1,8 @@
 //! Requests to the machine: by the command line's plan, over the link, by signals.
 //!
 //! There is a single state for all sources. A host that has sent a command is in control as long as it is not silent
-//! and keeps sending commands; other hosts can then only slow the machine down. The arbiter only requests: the
-//! supervisor decides, and each step here waits for its answer.
+//! and keeps sending commands; other hosts can then only hold it, ramp it down or stop it. The arbiter only requests:
+//! the supervisor decides, and each step here waits for its answer.
 
 use controller::supervised::{Cause, Finding, MACHINE_INPUT_NAMES, Phase, Request};
 use controller::supervision::LOOK_ALIKE;
@@ -29,7 +29,7 @@ pub struct SupervisorReport {
     /// Status of the control law.
     pub status: u32,
     pub tick: u64,
-    /// Number of commands that the loop had taken by then.
+    /// Number of commands that the loop had executed by then.
     pub orders: u32,
     /// Whether the set-point was a wave's.
     pub waving: bool,
@@ -86,15 +86,15 @@ enum Owner {
 enum Step {
     /// No plan: hosts alone.
     Free,
-    /// Asked to arm, until it does.
+    /// Arming was requested; until the machine arms.
     Arming,
-    /// Asked to run, until it does.
+    /// Running was requested; until the machine runs.
     Starting,
     /// Running; the trajectory was requested.
     Playing,
-    /// A ramp-down was requested; ends when it is off.
+    /// A ramp-down was requested; until the amplifiers are off.
     GoingDown,
-    /// Nothing left to ask.
+    /// Complete: the loop may end.
     Over,
 }
 
@@ -384,7 +384,7 @@ impl Arbiter {
         let place = place(name)?;
         if place >= COMMAND_WORDS {
             let free = MACHINE_INPUT_NAMES[..COMMAND_WORDS].join(", ");
-            return Err(format!("`{name}` is measured or has a request of its own; free are {free}"));
+            return Err(format!("`{name}` is measured, or set by a request; --set accepts {free}"));
         }
         let number: f64 = value.parse().map_err(|_| format!("`{name}`: expected a number, found `{value}`"))?;
         let word = number.is_finite().then(|| word_of(place, number)).flatten();
@@ -471,7 +471,7 @@ mod tests {
     #[test]
     fn a_plan_is_read_or_refused_with_what_is_expected() {
         for (assignment, expected) in [
-            ("request=1", "has a request of its own"),
+            ("request=1", "or set by a request"),
             ("setpoint[9]=1", "no input word `setpoint[9]`"),
             ("setpoint[0]=x", "expected a number, found `x`"),
             ("setpoint[0]=inf", "expected a finite number"),

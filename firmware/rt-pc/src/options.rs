@@ -22,11 +22,11 @@ Machine
   --comedi-out DEVICE  a card of the amplifiers, once for each in order
                        (default: that of the gauges)
   --comedi-range LOW:HIGH
-                       voltages that the range of a gauge's input must hold
+                       voltages that a gauge's input range must contain
                        (default -10:10)
   --comedi-out-range LOW:HIGH
-                       voltages that the range of an amplifier's output must
-                       hold (default -10:10)
+                       voltages that an amplifier's output range must contain
+                       (default -10:10)
   --assumed-ok         with --comedi: accept assumed values of the spec and
                        simulated records
   --comedi-library FILE

@@ -149,7 +149,7 @@ impl Service<'_> {
                     Err(error) => {
                         self.console
                             .operator
-                            .give_up(format!("{}: the record is not whole: {error}", path.display()), now);
+                            .give_up(format!("{}: the record is incomplete: {error}", path.display()), now);
                         outcome.record = Some((path, Err(error)));
                     }
                 }

@@ -29,12 +29,12 @@ impl Summary<'_> {
     pub fn failure(&self) -> Option<String> {
         let outcome = self.outcome;
         if !self.account.balances() {
-            return Some("the book of ticks does not balance: report this as a defect of specgen".to_owned());
+            return Some("planned is not on time + late + skipped: report this as a defect of specgen".to_owned());
         }
         let run: u64 = self.account.on_time() + self.account.late().iter().sum::<u64>();
         if outcome.rows + self.lost_rows != run {
             return Some(format!(
-                "{run} ticks were run, but {} rows came and {} were lost",
+                "{run} ticks ran, but {} rows were received and {} lost",
                 outcome.rows, self.lost_rows
             ));
         }
@@ -42,7 +42,7 @@ impl Summary<'_> {
             return Some(format!("the real-time thread used the allocator {} times", allocation::noticed()));
         }
         if let Some((path, Err(error))) = &outcome.record {
-            return Some(format!("{}: the record is not whole: {error}", path.display()));
+            return Some(format!("{}: the record is incomplete: {error}", path.display()));
         }
         if self.lost_rows > 0 && outcome.record.is_some() {
             let lost = self.lost_rows;
@@ -54,7 +54,7 @@ impl Summary<'_> {
             return Some(failure.clone());
         }
         if let Some((path, Err(error))) = &outcome.capture {
-            return Some(format!("{}: what the recorder kept could not be written: {error}", path.display()));
+            return Some(format!("{}: the recording could not be written: {error}", path.display()));
         }
         outcome.incidents.first().map(words)
     }
@@ -65,7 +65,7 @@ impl Summary<'_> {
         let silent = |name, value| (name, value, String::new());
         let lines = |lines: Vec<String>| lines.iter().map(|line| format!("{line}\n")).collect::<String>();
         let of_loop = format!(
-            "real-time thread: {} allocations, {} ticks that waited in their work, {} rows lost, {} device faults\n",
+            "real-time thread: {} allocations, {} ticks that had to wait, {} rows lost, {} device faults\n",
             allocation::noticed(),
             account.blocked(),
             self.lost_rows,
@@ -75,7 +75,7 @@ impl Summary<'_> {
             let numbers = [("hosts", hosts), ("requests", requests), ("errors", errors), ("closed_hosts", closed)];
             let numbers = Json::object(numbers.map(|(name, number)| (name, number.into())));
             let text = format!(
-                "link: {requests} requests of {hosts} hosts, {errors} invalid frames, {closed} connections closed: others took control or the room\n"
+                "link: {requests} requests of {hosts} hosts, {errors} invalid frames, {closed} connections closed (control lost, or replaced)\n"
             );
             (numbers, text)
         });
@@ -87,7 +87,7 @@ impl Summary<'_> {
                     (name, Json::object([("file", path.into()), ("ticks", (*rows).into())]), text)
                 }
                 Some((path, Err(error))) => {
-                    (name, Json::Null, format!("{name}: {} is not whole: {error}\n", path.display()))
+                    (name, Json::Null, format!("{name}: {} is incomplete: {error}\n", path.display()))
                 }
                 None => silent(name, Json::Null),
             });
@@ -325,21 +325,21 @@ mod tests {
             assert!(found.as_ref().is_some_and(|found| found.contains(text)), "{text}: {found:?}");
         };
         assert_eq!(failure(|_, _| {}), None);
-        found("3 ticks were run, but 2 rows came and 0 were lost", &|outcome, _| outcome.rows = 2);
-        found("but 3 rows came and 1 were lost", &|_, lost| *lost = 1);
+        found("3 ticks ran, but 2 rows were received and 0 lost", &|outcome, _| outcome.rows = 2);
+        found("but 3 rows were received and 1 lost", &|_, lost| *lost = 1);
         // Rows may be lost where nothing is recorded.
         assert_eq!(failure(|outcome, lost| (outcome.rows, *lost) = (2, 1)), None);
         found("the record lacks 1 ticks", &|outcome, lost| {
             (outcome.rows, *lost, outcome.record) = (2, 1, Some((file(), Ok(2))));
         });
         assert_eq!(failure(|outcome, _| outcome.record = Some((file(), Ok(3)))), None);
-        found("/some/file: the record is not whole: full", &|outcome, _| {
+        found("/some/file: the record is incomplete: full", &|outcome, _| {
             (outcome.record, outcome.failure) = (Some((file(), full())), Some("other".to_owned()));
         });
         found("other", &|outcome, _| {
             (outcome.capture, outcome.failure) = (Some((file(), full())), Some("other".to_owned()));
         });
-        found("what the recorder kept could not be written: full", &|outcome, _| {
+        found("the recording could not be written: full", &|outcome, _| {
             (outcome.capture, outcome.incidents) = (Some((file(), full())), vec![INCIDENT]);
         });
         found("the machine faulted at tick 41: emergency stop", &|outcome, _| {
@@ -369,10 +369,10 @@ mod tests {
             "without a\tright\n",
             "ticks  planned 5 = on time 2 + late 1 + skipped 2",
             "0 rows lost, 6 device faults\n",
-            "1 ticks that waited in their work",
+            "1 ticks that had to wait",
             "the machine faulted at tick 41: emergency stop\n",
             "record: 3 ticks in /r\\x\n",
-            "recorder: /c is not whole: full\n",
+            "recorder: /c is incomplete: full\n",
             "link: 30 requests of 2 hosts, 4 invalid frames, 5 connections closed",
         ] {
             assert!(text.contains(part), "{part}\n{text}");
@@ -395,7 +395,7 @@ mod tests {
             r#""recorder": null,"#,
             r#""link": { "hosts": 2, "requests": 30, "errors": 4, "closed_hosts": 5 },"#,
             r#""last_phase": "Holding","#,
-            r#""failure": "/c: what the recorder kept could not be written: full""#,
+            r#""failure": "/c: the recording could not be written: full""#,
             r#""max_ns": 90,"#,
         ] {
             assert!(json.contains(part), "{part}\n{json}");

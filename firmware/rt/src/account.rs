@@ -289,7 +289,7 @@ impl Account {
         );
         let _ = writeln!(text, "       late: outputs more than {} after the planned time", time_text(self.limit));
         if late + skipped > 0 {
-            let _ = writeln!(text, "  {:<18}{:>9}{:>9}{:>12}  look at", "cause", "late", "skipped", "longest");
+            let _ = writeln!(text, "  {:<18}{:>9}{:>9}{:>12}  check", "cause", "late", "skipped", "longest");
         }
         for cause in Cause::ALL {
             let (late, skipped) = (self.late[cause as usize], self.skipped[cause as usize]);

@@ -51,7 +51,7 @@ crate::state! { |words|
 pub trait ModalDamping<T: Real>: Copy + Debug + Snapshot {
     /// A section for each mode.
     type Sections;
-    /// Nothing asked for.
+    /// No request.
     const REST: Self;
     /// Resets the damping to zero.
     #[inline(always)]

@@ -242,7 +242,7 @@ impl<T: Real, const CAP: usize> ReversalMemory<T, CAP> {
     /// Γ⁻¹ and Γ in one: solves for `displacement`, which must be within the range of the table, and applies the drive
     /// that `permitted` makes of the solution (finite). `permitted` is called once.
     ///
-    /// Equal to the bit to [`ReversalMemory::solve`] followed by [`ReversalMemory::apply`]. A permitted drive differs
+    /// Bit-identical to [`ReversalMemory::solve`] followed by [`ReversalMemory::apply`]. A permitted drive differs
     /// from the solution by a fraction of a cell. It usually lies on the same segment of the branch, and then nothing
     /// is looked up twice.
     #[inline(always)]

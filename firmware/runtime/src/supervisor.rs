@@ -9,8 +9,9 @@
 //!     │ acknowledge               │ for a cause
 //!     └───────── faulted ◄────────┘            a cause that takes the amplifiers off at once: from any phase to faulted
 //! ```
-//! The law runs in one phase only. In all others codes are constant or ramp to rest by whole codes, never faster than
-//! the slew limit, so that no reading and no request can cause a jump. While arming, each leg makes one small pulse.
+//! The law runs in *running*, and until a stop of the platform completes. Otherwise codes are constant or ramp to
+//! rest by whole codes, never faster than the slew limit: no reading and no request can cause a jump. While arming,
+//! each leg makes one small pulse.
 //! `docs/supervisor.md` has the table of causes.
 //!
 //! | module | what |
@@ -18,12 +19,12 @@
 //! | `kinds` | phases, requests, causes, event bits |
 //! | `supervision` | what the spec fixes |
 //! | `debounce` | for how long a condition must last before it is a cause |
-//! | `watch` | what the gauges show against what was sent: stuck, disagreeing, astray |
+//! | `watch` | gauges against the model: stuck, disagreeing; tracking errors |
 //! | `phases` | the state machine |
 //! | `sift` | samples that leap are replaced, those that repeat are counted |
 //! | `wiring` | the check that arming ends with: each leg in turn, against the Jacobian |
-//! | `oscillation` | an error that goes on oscillating, and the stages that the law falls back to |
-//! | `approach` | set-points from where the legs are to where they are asked for |
+//! | `oscillation` | sustained oscillation of the error, and the stages that the law falls back to |
+//! | `approach` | six legs: set-points from the measured displacement to the requested one |
 
 mod approach;
 mod debounce;

@@ -12,7 +12,7 @@
 //! hysteresis h, to either side. With h above the noise, each passage is detected once.
 //!
 //! ```text
-//! armed ──x reaches p_k──► near p_k ──|x − p_k| ≥ h──► armed          a pulse on the way in, if its direction is asked for
+//! armed ──x reaches p_k──► near p_k ──|x − p_k| ≥ h──► armed          a pulse on the way in, if its direction is selected
 //! ```
 //! A pulse lasts `width` ticks, and the line is low for a tick before the next, so that every pulse has its own edge.
 //! Positions passed while the line is not low, and all but one of those passed within a tick, give no pulse and are
@@ -227,7 +227,7 @@ impl<T: Real> Watch<T> {
         self.high > 0
     }
 
-    /// Sets the line low and starts afresh.
+    /// Sets the line low and restarts it.
     fn rest(&mut self) {
         self.place = Place::Unknown;
         self.count = 0;

@@ -27,7 +27,7 @@ pub trait Burst {
     /// Transfers `count` bytes: sends `send(k)` as the k-th and passes the received byte to `take`. Ends with the last bit.
     ///
     /// # Errors
-    /// [`SpiTimeout`]; the next exchange starts afresh.
+    /// [`SpiTimeout`]; the next exchange starts from the beginning.
     fn exchange(
         &mut self,
         count: usize,

@@ -46,7 +46,7 @@ fn answer(work: impl FnOnce() -> Result<(), UnitError>) -> *const c_char {
     let refused: &'static CStr = match catch_unwind(AssertUnwindSafe(work)) {
         Ok(Ok(())) => return std::ptr::null(),
         Ok(Err(UnitError(why))) => why,
-        Err(_) => c"the plant failed on these inputs: begin anew with smaller ones",
+        Err(_) => c"the plant failed on these inputs: reset the unit and use smaller ones",
     };
     refused.as_ptr()
 }

@@ -144,8 +144,8 @@ struct GaugeArguments {
 #[derive(Args, Debug)]
 #[command(after_help = super::examples::PREDICT)]
 struct PredictArguments {
-    /// A table written by `specgen identify -o`, or a spec (.toml), whose tables, creep, second weight and dead time are used;
-    /// also the lines of one leg that `identify rate -o` writes.
+    /// A table written by `specgen identify -o`, or a spec (.toml), whose tables, rate tables, creep and dead time
+    /// are used; also the lines of one leg that `identify rate -o` writes.
     #[arg(value_name = "TABLE|SPEC")]
     model: InputFile,
     /// Drive: CSV with time_s and drive_V (the command) or monitor_V (the measured voltage). With displacement_um, the

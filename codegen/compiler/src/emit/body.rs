@@ -15,7 +15,7 @@ pub fn emit(ir: &Ir) -> TokenStream {
         d.pivot_ratio
     );
     quote! {
-        #![doc = " What the inverse dynamics know of the platform and its legs."]
+        #![doc = " Constants of the platform and its legs for the inverse dynamics."]
 
         use specgen_runtime::Platform;
         use specgen_runtime::dynamics::Leg;

@@ -15,7 +15,7 @@ pub fn emit(ir: &Ir) -> TokenStream {
     let beyond = literal::reals(ir.scalar, &converter.beyond);
     let calibrated = ir.task_space.as_ref().is_some_and(|task| task.sensing.calibration.is_some());
     let doc = format!(
-        " What the gauges' converters mean by a code of 0..2^bits, {}; a code at either end is a gauge fault. From `sensor`.",
+        " Conversion of a gauge converter's code, 0..2^bits, to {}; a code at either end is a gauge fault. From `sensor`.",
         if calibrated { "V" } else { "m" }
     );
     quote! {

@@ -19,7 +19,7 @@ pub fn emit(ir: &Ir) -> TokenStream {
         k.largest_displacement
     );
     quote! {
-        #![doc = " Legs and workspace, as the kinematics need them."]
+        #![doc = " Constants of legs and workspace for the kinematics."]
 
         use specgen_runtime::{Legs, Series};
 

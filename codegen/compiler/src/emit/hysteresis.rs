@@ -203,18 +203,18 @@ fn rate_doc(ir: &Ir) -> Vec<&'static str> {
     match &ir.hysteresis.rate {
         None => {}
         Some(RateModel::DynamicPreisach { .. }) => lines.extend([
-            " Γ is the dynamic Preisach model (6), its rate being that of one tick to the next; see `specgen_runtime::dynamic`.",
+            " Γ is the dynamic Preisach model (6), with the rate from one tick to the next; see `specgen_runtime::dynamic`.",
             " Where (6) cannot be inverted safely the static inverse is used, and `STATIC_INVERSE` says so.",
         ]),
         Some(RateModel::BoucWen { .. }) => {
             lines.push(" Γ is a table with a Bouc-Wen state, a read-out and creep; see `specgen_runtime::bouc_wen`.");
         }
         Some(RateModel::Creep { .. }) => {
-            lines.push(" Γ is the static model with creep behind it; see `specgen_runtime::creep`.");
+            lines.push(" Γ is the static model followed by creep; see `specgen_runtime::creep`.");
         }
     }
     if let Some(lead) = &ir.hysteresis.lead {
-        lines.push(" T is led by `LEAD` ticks at its own rate, for the dead time of the legs.");
+        lines.push(" T is advanced by `LEAD` ticks at its own rate, for the dead time of the legs.");
         if lead.bend.is_some() {
             lines.push(" `BEND` times its second difference is added, for their resonance.");
         }

@@ -15,7 +15,7 @@ pub fn emit(ir: &Ir) -> TokenStream {
     let description = description(ir);
     let assumed = &ir.assumed;
     quote! {
-        #![doc = " What this controller is."]
+        #![doc = " Identity and basic constants of this controller."]
 
         /// Floating-point type of this controller; from `controller.scalar`.
         pub type Real = #scalar;

@@ -16,7 +16,7 @@ pub fn emit(ir: &Ir) -> TokenStream {
         a.voltage[0], a.voltage[1]
     );
     quote! {
-        #![doc = " What may go out."]
+        #![doc = " Limits of the output codes."]
 
         use specgen_runtime::Dac;
 

@@ -18,7 +18,7 @@ pub fn emit(ir: &Ir) -> TokenStream {
     let words = literal::count(table.words().count());
     let state = literal::printed(&constants::sizes(ir));
     quote! {
-        #![doc = " What settings may be, and how large the numbers of a state may become: nothing beyond the limits of the spec."]
+        #![doc = " Permitted ranges of settings, and largest numbers of a state: nothing beyond the limits of the spec."]
 
         use specgen_runtime::PermittedRange;
         use specgen_runtime::snapshot::Sizes;

@@ -42,7 +42,7 @@ pub fn emit(ir: &Ir) -> TokenStream {
     let uses = s.wiring.is_some().then(|| quote! { , Wiring });
     let limits = s.risen.is_none().then(|| quote! { , limits });
     quote! {
-        #![doc = " What the supervisor takes for a fault; from `supervisor`."]
+        #![doc = " Thresholds and times of the supervisor's faults; from `supervisor`."]
 
         use specgen_law::Reset;
         use specgen_runtime::supervisor::{Steadiness, Supervision #uses};

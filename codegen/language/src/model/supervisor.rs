@@ -40,7 +40,7 @@ section! {
         /// Time for which the error must last.
         tracking_time: Option<f64> = TIMEOUT, Rule("100 ms, at least 12 periods"), "", "100 ms";
         /// Largest jump of a gauge's reading from the straight line through its two previous readings. A reading beyond it is replaced by that line; if this persists, it is a fault.
-        leap: Option<f64> = one(Dimension::LENGTH, Range::closed(1e-12, 1e-2), "um"), Rule("what voltages that turn round at `actuator.slew_rate` make of a reading behind the lags of amplifier and gauge, with noise and converter; of a calibrated gauge 1.5 times that"), "" ["jump", "sample_jump"], "2 um";
+        leap: Option<f64> = one(Dimension::LENGTH, Range::closed(1e-12, 1e-2), "um"), Rule("the largest jump of a reading when the voltages reverse at `actuator.slew_rate`, behind the lags of amplifier and gauge, with noise and converter; 1.5 times that for a calibrated gauge"), "" ["jump", "sample_jump"], "2 um";
         /// Largest amplitude of an error that environment and noise may cause permanently, from 60 Hz on; about the axes, at the platform joints. A larger oscillation is a fault, unless the motion explains it.
         disturbance: Option<f64> = one(Dimension::LENGTH, Range::closed(1e-10, 1e-2), "nm"), Rule("a 1500th of `actuator.stroke`, at least 6 times what the gauges' noise makes of an axis"), "" ["vibration", "oscillation"], "40 nm";
         /// Time for which a leg may stay at a limit of its voltage or table.

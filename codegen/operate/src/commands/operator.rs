@@ -29,7 +29,7 @@ use specgen_language::ui::Ui;
 const DOWN: Duration = Duration::from_secs(60);
 /// Ticks after which the status shows the effect of a command.
 const SEEN: u64 = 10;
-/// Timeout of these ticks.
+/// Time limit for these ticks.
 const ANSWERED: Duration = Duration::from_secs(2);
 
 /// Called at every poll of the machine. An error ends the current command.

@@ -97,7 +97,7 @@ fn poor(leg: usize, found: Option<LegGain>) -> String {
         |found| format!("has the gain {:.3} ± {:.3}", found.gain, found.error),
     );
     format!(
-        "leg {} {what}: record at least a second of a slow wave on all axes, as large as the workspace permits, in closed loop \
+        "leg {} of 1 to 6 {what}: record at least a second of a slow wave on all axes, as large as the workspace permits, in closed loop \
          and without contact",
         leg + 1
     )
@@ -197,7 +197,7 @@ struct Gains {
 impl Outcome for Gains {
     fn text(&self) -> String {
         let mut text =
-            format!("{}: gain of each leg relative to its table, from {:.3} s\n", self.recording, self.seconds);
+            format!("{}: gains of legs 1 to 6 relative to their tables, from {:.3} s\n", self.recording, self.seconds);
         let columns = [5, 9, 11, 11, 13, 15].map(|width| right(width).behind(" "));
         row(&mut text, &columns, &[&"leg", &"lambda", &"± std err", &"travel µm", &"error nm rms", &"with λ = 1"]);
         for (leg, found) in self.legs.iter().enumerate() {

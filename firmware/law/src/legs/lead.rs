@@ -6,7 +6,7 @@ use specgen_runtime::{Real, Snapshot};
 
 /// A lead on a leg's demand that compensates its dead time; or none.
 pub trait DeadTimeLead<T: Real>: Copy + Debug + Snapshot {
-    /// None asked for.
+    /// No lead.
     const REST: Self;
     /// Resets the lead to zero.
     #[inline(always)]

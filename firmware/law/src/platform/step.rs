@@ -5,17 +5,18 @@
 //!
 //! ```text
 //! sense      gauges → h                                                      pose from rest
-//! learn      e = N(h_d(t_n) − h) ;  s ← s + T k_I e                          (7), held where it would wind up
+//! learn      e = N(h_d(t_n) − h) ;  s ← s + T_s k_I e                        (7), held where it would wind up
 //!            ν = N(Y − (q̂ − p) − δ̂ − φ̂) ;  δ̂, φ̂ ← ν                        (AII.3), (AII.5), (AII.6), in modal coordinates
 //! setpoint   h_d, ḣ_d, ḧ_d at t_{n+1}
 //! load       p = (J⁻ᵀ(M ḧ_d + C ḣ_d + G + K_e (h_d − h_e)) − f_rest)/k_a      known deflection of the legs, (7)
-//!            + J⁻ᵀ k_v ė/k_a + τ (Δl(h_d(t_{n+1})) − Δl(h_d(t_n)))/T                  damping, lead
+//!            + J⁻ᵀ k_v ė/k_a + τ (Δl(h_d(t_{n+1})) − Δl(h_d(t_n)))/T_s                damping, lead
 //! legs       q = Δl(h_d) + p + J⁻ᵀ(k_p e + s)/k_a − δ̂ − φ̂ ;  u = Γ⁻¹(q)       limited: q̂ is q within the limits
 //! ```
-//! N is the modal notch. A correction c that was learned or prepared for the motion (`specgen_runtime::correction`)
-//! adds J c to q; the innovation does not see it, nor the damping. Active damping D(z) e, if the spec has it, is part
-//! of p: `specgen_runtime::damping`. p is a real load on the legs and belongs to the model of the innovation; the
-//! feedback is not a load and does not.
+//! N is the modal notch, T_s the period. A correction c that was learned or prepared for the motion adds J c to q
+//! (`specgen_runtime::correction`). Active damping, if the spec has it, adds J V D(z) V⁻¹ (h_d − h) to q
+//! (`specgen_runtime::damping`). The innovation sees neither of them, nor the term of k_v, nor the lead. Without the
+//! last two, p is a real load on the legs and belongs to the model of the innovation. The feedback is not a load and
+//! does not belong to it.
 //!
 //! Y = Δl(h) is linearised about the set-point, Δl(h_d) − J e. With q = Δl(h_d) + p + f − δ̂ − φ̂ + b (feedback f,
 //! offset b of a change of mode) and w = q − q̂ withheld by limits, the innovation is then w − b − f − J e: no large
@@ -187,8 +188,8 @@ fn bumpless_transfer<P: Platform>(p: P, config: &Config<P>, state: &mut State<P>
     state.transfer.begin(offset);
 }
 
-/// Enters or leaves the fallback. Damping starts again from zero: its present request, against the oscillation, would
-/// otherwise stay as an error of the platform. Integral and estimates stay.
+/// Enters or leaves the fallback. Active damping starts again from zero: its present request, against the
+/// oscillation, would otherwise stay as an error of the platform. Integral and estimates stay.
 #[cold]
 #[inline(never)]
 fn fall_back<P: Platform>(state: &mut State<P>, fallback: Fallback) {
@@ -244,7 +245,7 @@ pub fn sense<P: Platform>(p: P, config: &Config<P>, state: &mut State<P>, gauge:
     faults
 }
 
-/// Updates from the readings: the integral of (7), the run-to-run estimates, and the damping request.
+/// Updates from the readings: the integral of (7), the run-to-run estimates, and the request of active damping.
 #[inline]
 pub fn learn<P: Platform>(p: P, config: &Config<P>, state: &mut State<P>) {
     let mode = config.mode;
@@ -336,7 +337,7 @@ pub fn known_load<P: Platform>(p: P, config: &Config<P>, state: &State<P>) -> ([
     (load.displacement, each(|leg| (load.force[leg] - p.rest_force()[leg]) * p.compliance()))
 }
 
-/// J⁻ᵀ(k_p e + s)/k_a − δ̂ − φ̂, plus the damping request and J c: m of each leg.
+/// J⁻ᵀ(k_p e + s)/k_a − δ̂ − φ̂, plus active damping and J c: m of each leg.
 #[inline]
 pub fn reaction<P: Platform>(p: P, config: &Config<P>, state: &mut State<P>) -> [P::Real; LEGS] {
     if config.mode.feeds_back() {

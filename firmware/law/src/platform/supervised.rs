@@ -71,7 +71,7 @@ impl<P: Platform> ControlLaw<P> for TaskSpace {
     }
 
     /// A bumpless start. After arming, set-points begin at the measured pose and the estimates at zero. After a hold,
-    /// the last set-point and the estimates stay, and only the feedback starts afresh.
+    /// the last set-point and the estimates stay, and only the feedback is reset.
     #[cold]
     #[inline(never)]
     fn enter_running(p: P, _config: &Config<P>, machine: &mut Machine<P>, _input: &TickInput<P>) {

@@ -55,7 +55,7 @@ impl<P: ConstSpec> Config<P> {
         Self(P::DEFAULTS)
     }
 
-    /// A changed copy. While running, a change of mode is bumpless. An output line whose settings change starts afresh,
+    /// A changed copy. While running, a change of mode is bumpless. An output line whose settings change restarts,
     /// low.
     ///
     /// # Errors

@@ -24,9 +24,9 @@ pub struct Settings {
     pub input: PathBuf,
     /// Cards of the amplifiers, in order; that of the gauges if none is named.
     pub outputs: Vec<PathBuf>,
-    /// Voltages that a gauge's range must hold, V.
+    /// Voltages that a gauge's input range must contain, V.
     pub input_volts: [f64; 2],
-    /// Voltages that an output's range must hold, V.
+    /// Voltages that an output's range must contain, V.
     pub output_volts: [f64; 2],
 }
 

@@ -99,7 +99,7 @@ impl Amplifiers for SimulatedDevices {
     }
 }
 
-/// The outputs of a simulated machine lead nowhere; the record has them.
+/// The trigger outputs of a simulated machine drive nothing; they are only recorded.
 impl Lines for SimulatedDevices {
     const COUNT: usize = LINES;
     const INPUT: bool = true;

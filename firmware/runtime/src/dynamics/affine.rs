@@ -4,7 +4,7 @@ use crate::linear::{each, transform};
 use crate::motion::Motion;
 use crate::real::Real;
 
-/// p = P h + Q ḧ: by how much the legs give way to inertia and gravity, beyond what they do at rest.
+/// p = P h + Q ḧ: deflection of the legs by inertia and gravity, relative to that at rest.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Affine<T> {
     /// P, a row by leg, m/m and m/rad.

@@ -19,7 +19,7 @@ pub const STALLED: u32 = 1 << (Cause::Stalled.word() - FIRST_EVENT);
 /// Bits of an event word that map to causes by [`FIRST_EVENT`]. [`AMPLIFIER`] is a cause as well; the other bits are
 /// for records.
 pub const EVENTS: u32 = MISSED_TICK | LINK_LOST | INTEGRITY | CONVERTER | STOP | STALLED;
-/// The cause of an event bit is its number plus this.
+/// Bit k of an event word maps to the cause with number k plus this.
 pub const FIRST_EVENT: u64 = Cause::MissedTick.word();
 /// First bit in conditions for the gauges or legs concerned.
 pub(super) const FIRST_CHANNEL: u32 = 16;
@@ -34,7 +34,7 @@ choice! {
     pub enum Phase {
         /// Amplifiers off, codes at rest.
         Disarmed = 0 => "disarmed",
-        /// Amplifiers on, codes held; the law's state is set to the machine's.
+        /// Amplifiers on, codes at rest, then a pulse of each leg: the wiring check.
         Arming = 1 => "arming",
         /// The control law is active.
         Running = 2 => "running",

@@ -3,11 +3,12 @@
 //!
 //! ```text
 //! prediction   2 y(n−1) − y(n−2)            wrong by no more than the legs can accelerate, and noise: the bound `leap`
-//! swing        s ← max(15/16 s, |y(n) − prediction|/leap) of the gauge that swings most, of words that were not replaced, while an
-//!              oscillation is suspected, which no straight line predicts; afterwards as long as it is above 1. Else it decays, to
-//!              nothing. Where a prediction is remembered for a word, 3 s: so much may the next one be off a line through it
-//! replaced     |y(n) − prediction| > (1 + 2 s) leap; times 3, 6, … where y(n−1), y(n−2), … were missing or repeated. Not where y(n) is as near
-//!              to y(n−2): then it was y(n−1) that leapt, by less than the bound, and the middle replaces it from here on
+//! swing        s ← max(15/16 s, |y(n) − prediction|/leap), the largest of all gauges, without replaced words.
+//!              It grows while an oscillation is suspected, which no straight line predicts, and later only by
+//!              values above 1. If a prediction is stored for a word, s is tripled: the next line goes through it
+//! replaced     |y(n) − prediction| > (1 + 2 s) leap; 3, 6, … times that if y(n−1), y(n−2), … were missing or
+//!              repeated. If y(n) is within `leap` of y(n−2), then y(n−1) jumped, by less than the bound: the mean
+//!              of y(n) and y(n−2) replaces it from here on
 //! repeated     all six words are those of the sample before, or of the one before that
 //! ```
 //! Both are leaky counters: 4 up for a tick with the condition, 1 down for one without. Three replaced samples in a row
@@ -59,13 +60,13 @@ crate::state! { |words|
     pub struct Sift<T>[T: Real] {
         /// The two previous samples. Every word was valid.
         pub samples: [[T; 6]; 2] = [[T::ZERO; 6]; 2], rows(words.sizes().reading);
-        /// Index of the newer one.
+        /// Index of the newer sample.
         pub newer: usize = 0, place(1);
         /// Number of known samples.
         pub known: usize = 0, place(2);
         /// Number of samples in a row that were missing or repeated.
         pub predicted: usize = 0, place(MOST_PREDICTED);
-        /// Checksums of the words of the last two samples, the newer first; `samples` may not hold these words.
+        /// s: swing of the gauges during an oscillation, as a multiple of `leap`.
         pub swing: T = T::ZERO, number(LARGEST);
         /// Checksums of the words of the last two samples, the newer first, if they may differ from `samples`.
         pub sums: [u32; 2] = [0; 2], tallies;
@@ -119,8 +120,8 @@ impl<T: Real> Sift<T> {
         activity: Activity,
     ) -> u32 {
         let before = self.predicted;
-        let believed = faults(words) == 0;
-        self.repeated = self.repeats(supervision, words, believed, activity) && believed;
+        let is_valid = faults(words) == 0;
+        self.repeated = self.repeats(supervision, words, is_valid, activity) && is_valid;
         let (newer, older) = self.last_two();
         // The prediction if it is valid, otherwise the previous word.
         let mut prediction = each(|gauge| predict(newer[gauge], older[gauge]));
@@ -130,18 +131,18 @@ impl<T: Real> Sift<T> {
         self.replaced = 0;
         let mut smoothed = newer;
         self.swing = self.swing * T::from_f64(DECAY);
-        if believed && self.known == 2 {
+        if is_valid && self.known == 2 {
             smoothed = self.replace(supervision, words, &prediction, activity == Activity::Oscillating);
         }
-        if !believed && (self.known < 2 || self.predicted >= MOST_PREDICTED) {
+        if !is_valid && (self.known < 2 || self.predicted >= MOST_PREDICTED) {
             self.known = 0;
             self.predicted = 0;
         } else {
             self.samples[self.newer & 1] = smoothed;
             // A repeated sample is passed to the law, but carries no information on the motion.
-            let by_prediction = !believed || (self.repeated && self.known == 2);
+            let by_prediction = !is_valid || (self.repeated && self.known == 2);
             let remembered = if by_prediction { prediction } else { *words };
-            self.remember(words, &remembered, !believed || self.repeated);
+            self.remember(words, &remembered, !is_valid || self.repeated);
         }
         count(&mut self.leapt, self.replaced != 0, REPLACED_LIMIT);
         count(&mut self.stale, self.repeated, supervision.repeats);
@@ -170,13 +171,13 @@ impl<T: Real> Sift<T> {
     }
 
     /// Whether the words repeat an earlier sample, on a machine whose gauges showed noise at rest.
-    fn repeats(&mut self, supervision: &Supervision<T>, words: &[T; 6], believed: bool, activity: Activity) -> bool {
+    fn repeats(&mut self, supervision: &Supervision<T>, words: &[T; 6], is_valid: bool, activity: Activity) -> bool {
         let (newer, older) = self.last_two();
         let sums = if self.quiet { [sum(&newer), sum(&older)] } else { self.sums };
         let now = sum(words);
         let same = now == sums[0] || now == sums[1];
         self.sums = [now, sums[0]];
-        if activity == Activity::Standing && believed {
+        if activity == Activity::Standing && is_valid {
             self.noise = if same { self.noise.saturating_sub(1) } else { self.noise.saturating_add(3) };
             let most = supervision.arm_ticks.saturating_mul(3);
             if self.noise > most {

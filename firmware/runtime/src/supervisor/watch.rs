@@ -29,12 +29,12 @@ crate::state! { |words|
     pub struct Channel<T>[T: Real] {
         /// Last word of the gauge.
         pub word: T = T::ZERO, number(words.sizes().reading);
-        /// There is one.
+        /// Whether `word` is valid.
         pub known: bool = false, set;
         /// Smallest and largest expected reading since that word came, m: displacement less the known load, which a
         /// gain may have made large.
         pub expected: [T; 2] = [T::ZERO; 2], numbers(words.sizes().request);
-        /// Samples since these differ by more than the gauge can fail to show.
+        /// Samples since `expected` spans more than `Supervision::stuck_motion`.
         pub stuck: u32 = 0, tally;
         /// Count of samples in which reading and model disagreed, less samples in which they agreed.
         pub disagreed: u32 = 0, tally;
@@ -60,7 +60,7 @@ crate::state! { |words|
 }
 
 impl<T: Real> Watch<T> {
-    /// Clears the suspicions, but keeps the position.
+    /// Clears all counts and suspicions, but keeps `turn`.
     #[inline(never)]
     pub fn forgive(&mut self) {
         for channel in &mut self.channels {

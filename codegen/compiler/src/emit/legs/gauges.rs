@@ -10,7 +10,7 @@ pub fn emit(ir: &Ir) -> TokenStream {
     let converter = gauge_converter::emit(ir);
     let (gauge, setpoint) = (literal::reals(ir.scalar, &ir.bounds.sensor), literal::reals(ir.scalar, &ir.bounds.leg));
     quote! {
-        #![doc = " Readings of the legs' own gauges, and set-points of legs: what is believed."]
+        #![doc = " Readings and set-points of the legs: the ranges that are accepted."]
 
         use specgen_runtime::GaugeConverter;
 

@@ -27,11 +27,11 @@ pub fn emit(ir: &Ir, s: &Sensing) -> TokenStream {
     };
     let coefficients = literal::count(coefficients);
     let raw_doc = format!(
-        " Lowest and highest word of each gauge that is believed, {unit}: readings within `sensor.range`, where the gauge means one \
-         reading by one word."
+        " Lowest and highest valid word of each gauge, {unit}: readings within `sensor.range`, where words and readings \
+         correspond one to one."
     );
     quote! {
-        #![doc = " Six gauges that see the platform: where they are, what their words mean, and the filter of the pose's rate."]
+        #![doc = " Six gauges that measure the platform: positions, conversion of their words, and the filter of the pose's rate."]
 
         use specgen_runtime::{Calibration, GaugeConverter, Gauges, RateFilter};
 

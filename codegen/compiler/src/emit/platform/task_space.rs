@@ -13,7 +13,7 @@ pub fn emit(ir: &Ir, task: &TaskSpace) -> TokenStream {
     let law = &task.law;
     let load = literal::constant!(ir.scalar, affine, &task.load);
     let load_doc = format!(
-        " To first order the legs give way to inertia and gravity by P h + Q ḧ: at most {:.3e} m off in moves and trajectories, {:.1e} in stops; \
+        " To first order inertia and gravity deflect the legs by P h + Q ḧ: at most {:.3e} m off in moves and trajectories, {:.1e} in stops; \
          from `control.dynamics`. None: by the whole kernel.",
         task.load.bounds[0].error, task.load.bounds[1].error
     );

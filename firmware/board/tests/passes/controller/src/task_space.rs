@@ -135,7 +135,7 @@ pub const MODES_TO_LEGS: [[Real; 6]; LEGS] = [
     ],
 ];
 
-/// To first order the legs give way to inertia and gravity by P h + Q ḧ: at most 1.232e-10 m off in moves and trajectories, 3.0e-9 in stops; from `control.dynamics`. None: by the whole kernel.
+/// To first order inertia and gravity deflect the legs by P h + Q ḧ: at most 1.232e-10 m off in moves and trajectories, 3.0e-9 in stops; from `control.dynamics`. None: by the whole kernel.
 pub const AFFINE_LOAD: Option<Affine<Real>> = Some(Affine {
     pose: [
         [0.0, 4.37169477466866e-6, 0.0, 0.0, 0.0, 0.0],
