@@ -142,6 +142,26 @@ fn a_measured_growing_sine_gives_a_table_for_its_range() {
     assert!(best.held_out_percent < 0.15, "{best:?}");
 }
 
+/// The cells beyond the sine continue those before them: the gain of the whole range is about that of the record.
+#[test]
+fn a_measured_growing_sine_gives_a_table_for_a_range_a_little_wider() {
+    let Some(sine) = measured("validate-growing-sine-5hz.csv") else { return };
+    let late = DeadTime::Fixed(1.14e-4);
+    let gain = |range: [f64; 2]| {
+        let found = identify(&sine, &Options { dead_time: late, ..Options::new(16, range) });
+        let found = found.unwrap_or_else(|d| panic!("{d:#?}"));
+        let error = predicted(&found.table, &sine, 1.14e-4).rms_percent;
+        println!("{range:?}: {:.4} um/V, prediction {error:.3} %", found.table.mean_gain() * 1e6);
+        (found, error)
+    };
+    let ((own, least), (wide, error)) = (gain([-82.0, 74.0]), gain([-90.0, 90.0]));
+    assert!(wide.warnings.iter().any(|d| d.code == "W0609" && d.message.contains("continue")), "{:#?}", wide.warnings);
+    let ratio = wide.table.mean_gain() / own.table.mean_gain();
+    assert!((0.9..1.1).contains(&ratio) && error < 2.0 * least, "{ratio} {error} {least}");
+    let refused = identify(&sine, &Options::new(16, [-110.0, 74.0])).unwrap_err();
+    assert!(refused.iter().any(|d| d.code == "E0606"), "{refused:#?}");
+}
+
 /// The drive is noise of large amplitude, the gain of which is hysteresis at low frequencies.
 #[test]
 fn a_measured_wide_band_record_shows_the_resonance() {

@@ -9,6 +9,7 @@ use super::findings::Findings;
 use super::record::Record;
 use super::regressor::Plane;
 use super::sanity::{self, PLAUSIBLE_RANGE};
+use super::selection;
 use super::statistics::{extent, micrometres};
 use crate::everett::EverettTable;
 use specgen_language::diagnostic::codes;
@@ -17,6 +18,8 @@ use specgen_language::shell;
 
 /// Fraction by which the record may exceed the declared range (amplifier overshoot, ADC noise).
 const BEYOND: f64 = 0.02;
+/// Fraction of the range at each of its ends that loops may leave out.
+const SMOOTH_END: f64 = 0.1;
 /// A ratio of ranges this large shows a wrong unit, not a wrong experiment.
 const UNIT_RATIO: f64 = 100.0;
 /// Fewer reversal curves identify nothing.
@@ -70,6 +73,15 @@ pub(crate) fn check_range(record: &Record, plane: &Plane, findings: &mut Finding
         findings.add(codes::DRIVE_RANGE, None, format!("{found}; it leaves that range at {left} s"), help);
     }
     let interval = plane.interval();
+    // Growing or decaying loops: a smooth table goes on a little beyond them.
+    let loops = selection::hardly_returns(record, plane);
+    if loops && bottom <= low + SMOOTH_END * span && top >= high - SMOOTH_END * span {
+        if bottom > low + interval || top < high - interval {
+            let message = format!("{found}: the cells beyond were never excited, and continue those before them");
+            findings.add(codes::CELLS_INTERPOLATED, None, message, "name the range that the record covers as --drive");
+        }
+        return;
+    }
     if bottom > low + interval {
         let message = format!("{found}: no cell with a down_threshold below {bottom} V was ever excited");
         let help =

@@ -18,7 +18,7 @@ use super::regressor::Plane;
 use super::statistics::{extent, median, noise_floor};
 
 /// Least ratio of the fast to the slow branches (90 % and 10 % quantile of |du/dt|) for an estimate of the dead time.
-const RATE_RATIO: f64 = 2.0;
+pub(crate) const RATE_RATIO: f64 = 2.0;
 /// Longest dead time tried, s, and as a fraction of a fast branch: half a cycle later, a table of negative weights fits
 /// as well.
 const LONGEST: f64 = 8e-3;
@@ -176,7 +176,7 @@ fn vertex([a, b, c]: [f64; 3], step: f64) -> f64 {
 }
 
 /// 10 % and 90 % quantile of the mean rates of the branches, V/s.
-fn rates(record: &Record, branches: &[Branch]) -> (f64, f64) {
+pub(crate) fn rates(record: &Record, branches: &[Branch]) -> (f64, f64) {
     let mut rates: Vec<f64> = branches
         .iter()
         .map(|b| {

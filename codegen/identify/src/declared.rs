@@ -72,7 +72,9 @@ impl SpecRecords {
     pub fn leg(&self, model: &Model, leg: usize) -> Option<RateModel> {
         let of = |tables: &[EverettTable]| tables.get(leg).or(tables.first()).cloned();
         let mode = Some((mode_of(model), model.actuator.resonance_gain));
-        Some(of_tables(&model.hysteresis, of(&self.tables)?, of(&self.rate_tables), mode))
+        let around = self.around.get(leg).or(self.around.first()).cloned().flatten();
+        let found = LegModel { table: of(&self.tables)?, around };
+        Some(of_tables(&model.hysteresis, found, of(&self.rate_tables), mode))
     }
 
     /// For a command that uses tables only.
@@ -150,21 +152,19 @@ impl SpecRecords {
 /// The model of the tables of a leg with the other values of `lines`, and a mode with its share of the mean gain.
 fn of_tables(
     lines: &Hysteresis,
-    still: EverettTable,
+    found: LegModel,
     rate: Option<EverettTable>,
     mode: Option<(Mode, Option<f64>)>,
 ) -> RateModel {
-    let creep = match &lines.rate {
-        RateDependence::Creep(terms) => {
-            terms.iter().map(|&[time_constant, weight]| CreepTerm { time_constant, weight }).collect()
-        }
-        _ => Vec::new(),
-    };
-    let inertia = mode.map(|(mode, share)| Inertia {
+    let mut model = RateModel { rate, dead_time: lines.dead_time, ..RateModel::of_leg(found) };
+    if let RateDependence::Creep(terms) = &lines.rate {
+        model.creep = CreepTerm::list(terms);
+    }
+    model.inertia = mode.map(|(mode, share)| Inertia {
         mode,
-        gain: share.map_or_else(|| still.reversal_gain(), |share| share * still.mean_gain()),
+        gain: share.map_or_else(|| model.reversal_gain(), |share| share * model.still.mean_gain()),
     });
-    RateModel { still, rate, creep, inertia, dead_time: lines.dead_time }
+    model
 }
 
 /// The model of `leg`, 0 to 5, in the lines of a leg, whose files are relative to `dir`; its records are tables.
@@ -177,21 +177,17 @@ pub fn of_lines((lines, mode, share): &LegLines, dir: &Path, leg: usize) -> Resu
         Ok((read_file(&dir.join(&name), &name)?, name))
     };
     let (text, name) = file(&lines.records)?;
-    let LegModel { table: still, around: None } = read_leg_csv(&text, &name)? else {
-        let mut findings = Findings::new(&name);
-        findings.add(codes::TABLE_FILE, None, ONLY_TABLES.to_owned(), "identify the record with --model preisach");
-        return Err(findings.into_diagnostics());
-    };
+    let found = read_leg_csv(&text, &name)?;
     let mut second = None;
     if let RateDependence::DynamicPreisach(files) = &lines.rate {
         let (text, name) = file(files)?;
         let table = rate::read_rate_csv(&text, &name)?;
-        let wanted = (still.grid, [still.drive_min, still.drive_max]);
+        let wanted = (found.table.grid, [found.table.drive_min, found.table.drive_max]);
         of_grid(wanted, &name, &table, codes::RATE_TABLE_MISMATCH, "hysteresis.rate_tables")?;
         second = Some(table);
     }
     let mode = mode.map(|[frequency, damping]| (Mode { frequency, damping }, *share));
-    Ok(of_tables(lines, still, second, mode))
+    Ok(of_tables(lines, found, second, mode))
 }
 
 /// The leg's resonance in the spec.

@@ -131,24 +131,45 @@ impl Around {
         Some((inverse, worst))
     }
 
-    /// The state A z after the drive has gone by `step` (V), µm: the runtime's equation in small steps.
+    /// The state A z after the drive has gone from `from` by `step` (V), µm.
     #[must_use]
-    pub fn lost(&self, from: f64, step: f64) -> f64 {
-        const STEPS: usize = 4096;
-        let du = step / STEPS as f64;
-        let rate = |z: f64| {
-            let along = if du < 0.0 { -z } else { z };
-            self.slope - if along < 0.0 { self.beta - self.gamma } else { self.beta + self.gamma } * along
-        };
-        (0..STEPS).fold(from, |z, _| z + du * rate(z + 0.5 * du * rate(z)))
+    pub fn state_after(&self, from: f64, step: f64) -> f64 {
+        if self.slope == 0.0 {
+            return 0.0;
+        }
+        self.slope * fit::advanced(from / self.slope, step, [self.beta + self.gamma, self.beta - self.gamma])
+    }
+
+    /// Turns displacements of the table (m) at `drive` (V) to those of the leg before its creep. `full`: the drive has
+    /// come from the upper end of `range`, not the lower.
+    pub(crate) fn complete(&self, displacement: &mut [f64], drive: &[f64], [low, high]: [f64; 2], full: bool) {
+        let start = if full { self.state_after(self.rest_um, high - low) } else { self.rest_um };
+        let (mut z, mut before) = (start, if full { high } else { low });
+        let inverse = self.inverse().unwrap_or_default().0;
+        for (y, u) in displacement.iter_mut().zip(drive) {
+            z = self.state_after(z, u - before);
+            before = *u;
+            let p = *y * 1e6 - (z - self.rest_um);
+            *y = inverse.iter().rev().fold(0.0, |sum, c| (sum + c) * p) * 1e-6;
+        }
+    }
+
+    /// Gain of small motion, m/V: after a reversal the state takes A, and the read-out its mean slope.
+    pub(crate) fn reversal_gain(&self, table: &EverettTable) -> f64 {
+        let slope = self.read_out(self.travel_um) / self.travel_um;
+        (table.reversal_gain() - self.slope * 1e-6) / slope
     }
 }
 
-/// Displacement at full drive of legs with these tables, m.
+/// Displacement of legs with these tables after full drive for a second, m: a table without creep beside it has that of
+/// its record in it.
 #[must_use]
 pub fn strokes(tables: &[EverettTable], around: &[Option<Around>]) -> Vec<f64> {
     let of = |(k, table): (usize, &EverettTable)| match around.get(k) {
-        Some(Some(around)) => around.travel_um * 1e-6,
+        Some(Some(around)) => {
+            let crept = |sum, [time, weight]: &[f64; 2]| sum - weight * libm::expm1(-1.0 / time);
+            around.travel_um * 1e-6 * around.creep.iter().fold(1.0, crept)
+        }
         _ => table.node(table.grid, 0),
     };
     tables.iter().enumerate().map(of).collect()

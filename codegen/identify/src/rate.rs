@@ -28,6 +28,7 @@ pub(crate) mod start;
 mod table;
 
 use crate::everett::EverettTable;
+use crate::leg_model::{Around, LegModel};
 use specgen_language::diagnostic::Diagnostic;
 
 use super::findings::Findings;
@@ -84,6 +85,13 @@ pub struct CreepTerm {
     pub weight: f64,
 }
 
+impl CreepTerm {
+    /// Terms of time constants (s) and weights.
+    pub(crate) fn list(terms: &[[f64; 2]]) -> Vec<Self> {
+        terms.iter().map(|&[time_constant, weight]| Self { time_constant, weight }).collect()
+    }
+}
+
 /// Contribution of a mode to the displacement: its response to `gain` · drive, less gain · drive itself.
 ///
 /// The input is not the displacement of the table: its edges at the nodes would make a lightly damped mode ring, which
@@ -102,6 +110,8 @@ pub struct Inertia {
 pub struct RateModel {
     /// Γ₀: the rate-independent table, m.
     pub still: EverettTable,
+    /// What is around Γ₀ in a leg model; its creep is in `creep`.
+    pub around: Option<Around>,
     /// Γ₁, m s/V, on the grid of `still`; its weights are of either sign.
     pub rate: Option<EverettTable>,
     /// Creep after Γ₀, slowest first.
@@ -117,7 +127,20 @@ impl RateModel {
     /// The static model of a table with `dead_time` (s).
     #[must_use]
     pub const fn of_table(still: EverettTable, dead_time: f64) -> Self {
-        Self { still, rate: None, creep: Vec::new(), inertia: None, dead_time }
+        Self { still, around: None, rate: None, creep: Vec::new(), inertia: None, dead_time }
+    }
+
+    /// A leg model without dead time.
+    #[must_use]
+    pub fn of_leg(LegModel { table, around }: LegModel) -> Self {
+        let creep = around.as_ref().map_or_else(Vec::new, |around| CreepTerm::list(&around.creep));
+        Self { around, creep, ..Self::of_table(table, 0.0) }
+    }
+
+    /// Gain of small motion, m/V.
+    #[must_use]
+    pub fn reversal_gain(&self) -> f64 {
+        self.around.as_ref().map_or_else(|| self.still.reversal_gain(), |around| around.reversal_gain(&self.still))
     }
 }
 

@@ -54,6 +54,12 @@ fn unknown_start(record: &Record, plane: &Plane, after_visit: Option<usize>) -> 
     all.first().filter(|_| !most && all.len() > 1).map(|branch| branch.first)
 }
 
+/// Whether a record hardly ever returns to its lowest drive.
+pub(crate) fn hardly_returns(record: &Record, plane: &Plane) -> bool {
+    let tolerance = AT_MINIMUM * (plane.range[1] - plane.range[0]);
+    unknown_start(record, plane, branches::first_usable(record, tolerance)).is_some()
+}
+
 /// Takes the weight of samples at which the drive goes further than ever before, if the state at the start is unknown:
 /// there the record shows cells that were on or off before it. Elsewhere its own extrema have set every cell that
 /// switches.

@@ -310,9 +310,9 @@ pub struct BoucWen {
     /// a, m per cell.
     pub slope: f64,
     /// β + γ, per cell.
-    pub onward: f64,
+    pub beta_plus_gamma: f64,
     /// β − γ, per cell.
-    pub back: f64,
+    pub beta_minus_gamma: f64,
     /// a/(β + γ), m.
     pub limit: f64,
     /// z₀, m.
@@ -324,7 +324,7 @@ impl BoucWen {
     #[must_use]
     pub fn numbers(&self) -> Vec<f64> {
         let lists = [&self.gains, &self.weights, &self.carried].map(Vec::as_slice);
-        let after = [self.slope, self.onward, self.back, self.limit, self.rest];
+        let after = [self.slope, self.beta_plus_gamma, self.beta_minus_gamma, self.limit, self.rest];
         [&lists.concat(), &[self.direct, self.share][..], &self.read_out, &self.inverse, &self.travel, &after].concat()
     }
 
@@ -346,8 +346,8 @@ impl BoucWen {
             inverse: numbers.vector(&self.inverse),
             travel: numbers.vector(&self.travel),
             slope: numbers.real(self.slope),
-            onward: numbers.real(self.onward),
-            back: numbers.real(self.back),
+            beta_plus_gamma: numbers.real(self.beta_plus_gamma),
+            beta_minus_gamma: numbers.real(self.beta_minus_gamma),
             limit: numbers.real(self.limit),
             rest: numbers.real(self.rest),
         })

@@ -112,12 +112,12 @@ macro_rules! models {
 
         impl<T: Real> Memory<T> {
             /// Risen from negative saturation to `drive`; with a Bouc-Wen state, the table's part and z there.
-            pub fn risen(self, drive: T, displacement: T, rate: T, [still, lost]: [T; 2]) -> Self {
+            pub fn risen(self, drive: T, displacement: T, rate: T, [still, z]: [T; 2]) -> Self {
                 match self {
                     Self::Static(_) => Self::Static(ReversalMemory::risen(drive, displacement)),
                     Self::Dynamic(_) => Self::Dynamic(DynamicMemory::risen(drive, displacement, rate)),
                     $(Self::$creep(_) => Self::$creep(CreepMemory::risen(drive, displacement)),)+
-                    $(Self::$bouc_wen(_) => Self::$bouc_wen(BoucWenMemory::risen(drive, still, lost, displacement)),)+
+                    $(Self::$bouc_wen(_) => Self::$bouc_wen(BoucWenMemory::risen(drive, still, z, displacement)),)+
                 }
             }
         }

@@ -31,8 +31,8 @@
 //!     inverse: [1.0, 0.0, 0.0, 0.0, 0.0],
 //!     travel: [-1.0, 6.0],
 //!     slope: 1.0,
-//!     onward: 4.0,
-//!     back: 0.0,
+//!     beta_plus_gamma: 4.0,
+//!     beta_minus_gamma: 0.0,
 //!     limit: 0.25,
 //!     rest: -0.25,
 //! };
@@ -75,9 +75,9 @@ pub struct BoucWen<T, const K: usize> {
     /// a: what z takes of a small step after a reversal from z = 0, m per cell.
     pub slope: T,
     /// β + γ: how fast z saturates in the direction of its sign, per cell.
-    pub onward: T,
+    pub beta_plus_gamma: T,
     /// β − γ: the same against its sign.
-    pub back: T,
+    pub beta_minus_gamma: T,
     /// a/(β + γ), m.
     pub limit: T,
     /// z₀, m.
@@ -92,14 +92,14 @@ impl<T: Real, const K: usize> BoucWen<T, K> {
         crc.reals(&self.read_out);
         crc.reals(&self.inverse);
         crc.reals(&self.travel);
-        crc.reals(&[self.slope, self.onward, self.back, self.limit, self.rest]);
+        crc.reals(&[self.slope, self.beta_plus_gamma, self.beta_minus_gamma, self.limit, self.rest]);
     }
 
-    /// dz/du at z = `lost`, in the direction of `step`.
+    /// dz/du at `z`, in the direction of `step`.
     #[inline(always)]
-    fn rate(&self, lost: T, step: T) -> T {
-        let along = if step < T::ZERO { -lost } else { lost };
-        self.slope - if along < T::ZERO { self.back } else { self.onward } * along
+    fn rate(&self, z: T, step: T) -> T {
+        let along = if step < T::ZERO { -z } else { z };
+        self.slope - if along < T::ZERO { self.beta_minus_gamma } else { self.beta_plus_gamma } * along
     }
 }
 
@@ -118,7 +118,7 @@ crate::state! { |words|
     pub struct BoucWenMemory<T, CAP, K>[T: Real, const CAP: usize, const K: usize](rest: T) {
         memory: ReversalMemory<T, CAP> = ReversalMemory::new(), part;
         /// z, m.
-        lost: T = rest, number(words.sizes().leg);
+        z: T = rest, number(words.sizes().leg);
         /// Last step of the drive, cells.
         step: T = T::ZERO, number(LARGEST);
         /// x_j, m.
@@ -129,11 +129,11 @@ crate::state! { |words|
 }
 
 impl<T: Real, const CAP: usize, const K: usize> BoucWenMemory<T, CAP, K> {
-    /// At a drive just reached from below, see [`ReversalMemory::risen`]: `still` of the table, z = `lost`, and
+    /// At a drive just reached from below, see [`ReversalMemory::risen`]: `still` of the table, `z`, and
     /// `displacement` without creep, m.
     #[must_use]
-    pub const fn risen(drive: T, still: T, lost: T, displacement: T) -> Self {
-        let mut memory = Self::new(lost);
+    pub const fn risen(drive: T, still: T, z: T, displacement: T) -> Self {
+        let mut memory = Self::new(z);
         memory.memory = ReversalMemory::risen(drive, still);
         memory.displacement = displacement;
         memory
@@ -151,13 +151,6 @@ impl<T: Real, const CAP: usize, const K: usize> BoucWenMemory<T, CAP, K> {
     #[must_use]
     pub fn displacement(&self) -> T {
         self.displacement
-    }
-
-    /// z, m.
-    #[inline]
-    #[must_use]
-    pub fn lost(&self) -> T {
-        self.lost
     }
 
     /// One tick with `drive` (cells, finite, held within 0..=N); returns the displacement at its end, m.
@@ -228,7 +221,7 @@ impl<T: Real, const CAP: usize, const K: usize> BoucWenMemory<T, CAP, K> {
         }
         let wanted = rest * around.share;
         let h = saturate(wanted, around.travel[0], around.travel[1]);
-        let ahead = self.lost + self.step * around.rate(self.lost, self.step);
+        let ahead = self.z + self.step * around.rate(self.z, self.step);
         (polynomial(&around.read_out, h) + (ahead - around.rest), h == wanted)
     }
 
@@ -237,10 +230,10 @@ impl<T: Real, const CAP: usize, const K: usize> BoucWenMemory<T, CAP, K> {
     fn advance<G: Grid<T>>(&mut self, table: &BoucWenEverett<'_, T, G, K>, before: T) {
         let around = table.around;
         self.step = self.memory.drive() - before;
-        let middle = self.lost + T::HALF * self.step * around.rate(self.lost, self.step);
-        let lost = self.lost + self.step * around.rate(middle, self.step);
-        self.lost = saturate(lost, -around.limit, around.limit);
-        let h = polynomial(&around.inverse, self.memory.displacement() - (self.lost - around.rest));
+        let middle = self.z + T::HALF * self.step * around.rate(self.z, self.step);
+        let z = self.z + self.step * around.rate(middle, self.step);
+        self.z = saturate(z, -around.limit, around.limit);
+        let h = polynomial(&around.inverse, self.memory.displacement() - (self.z - around.rest));
         let h = saturate(h, around.travel[0], around.travel[1]);
         let mut displacement = h;
         for ((state, gain), weight) in self.states.iter_mut().zip(&around.creep.gains).zip(&around.creep.weights) {

@@ -111,8 +111,8 @@ fn rate(ir: &Ir, of_leg: &[Ident]) -> Rate {
                 let list = |values: &[f64]| literal::reals(ir.scalar, values);
                 let (gains, weights, carried) = (list(&leg.gains), list(&leg.weights), list(&leg.carried));
                 let (read_out, inverse, travel) = (list(&leg.read_out), list(&leg.inverse), list(&leg.travel));
-                let [direct, share, slope, onward, back, limit, rest] =
-                    [leg.direct, leg.share, leg.slope, leg.onward, leg.back, leg.limit, leg.rest]
+                let [direct, share, slope, beta_plus_gamma, beta_minus_gamma, limit, rest] =
+                    [leg.direct, leg.share, leg.slope, leg.beta_plus_gamma, leg.beta_minus_gamma, leg.limit, leg.rest]
                         .map(|value| literal::real(ir.scalar, value));
                 quote! {
                     BoucWen {
@@ -122,8 +122,8 @@ fn rate(ir: &Ir, of_leg: &[Ident]) -> Rate {
                         inverse: [#inverse],
                         travel: [#travel],
                         slope: #slope,
-                        onward: #onward,
-                        back: #back,
+                        beta_plus_gamma: #beta_plus_gamma,
+                        beta_minus_gamma: #beta_minus_gamma,
                         limit: #limit,
                         rest: #rest,
                     }

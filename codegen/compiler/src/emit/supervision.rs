@@ -102,8 +102,8 @@ fn at_rest(ir: &Ir) -> TokenStream {
                 match &rest.bouc_wen {
                     None => quote! { Memory::risen(#drive, #displacement #rate) },
                     Some(parts) => {
-                        let [still, lost] = parts[leg].map(real);
-                        quote! { Memory::risen(#drive, #still, #lost, #displacement) }
+                        let [still, z] = parts[leg].map(real);
+                        quote! { Memory::risen(#drive, #still, #z, #displacement) }
                     }
                 }
             });

@@ -106,7 +106,7 @@ fn bouc_wen(model: &Model, tables: &[EverettTable], around: &[Option<Around>], s
         };
         let [gains, weights, carried] = creep(&terms, period).map(|list| list.into_iter().map(round).collect());
         let direct = direct(&terms, period);
-        let onward = (own.beta + own.gamma) * volts_per_cell;
+        let beta_plus_gamma = (own.beta + own.gamma) * volts_per_cell;
         let slope = own.slope * UNIT * volts_per_cell;
         BoucWen {
             gains,
@@ -118,9 +118,9 @@ fn bouc_wen(model: &Model, tables: &[EverettTable], around: &[Option<Around>], s
             inverse: powers(inverse),
             travel: own.range().map(|h| round(h * UNIT)),
             slope: round(slope),
-            onward: round(onward),
-            back: round((own.beta - own.gamma) * volts_per_cell),
-            limit: round(if slope > 0.0 { slope / onward } else { 0.0 }),
+            beta_plus_gamma: round(beta_plus_gamma),
+            beta_minus_gamma: round((own.beta - own.gamma) * volts_per_cell),
+            limit: round(if slope > 0.0 { slope / beta_plus_gamma } else { 0.0 }),
             rest: round(own.rest_um * UNIT),
         }
     };

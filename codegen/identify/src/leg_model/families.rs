@@ -22,8 +22,9 @@ use specgen_language::model::LegModelKind as Kind;
 const SAMPLES: usize = 12_000;
 /// Branches shorter than this share of the range are not scored: they show how the record began.
 const SCORED: f64 = 0.1;
-/// Share of the least error by which a simpler family other than the table may be worse: that is below the noise of most gauges.
-const WORTHWHILE: f64 = 0.2;
+/// Share of the least error by which a simpler family other than the table may be worse, and share of the gauge's noise:
+/// held-out errors near the noise differ by less than motion shows.
+const WORTHWHILE: [f64; 2] = [0.1, 0.2];
 /// Fewer folds give no estimate of the spread.
 const FEWEST_FOLDS: usize = 3;
 
@@ -85,6 +86,12 @@ fn chosen(
 ) -> Option<(Family, LegModel, Vec<FamilyScore>)> {
     let plane = Plane { grid: options.grid, range: options.drive };
     let used = selection::usable(record, &plane, findings)?;
+    let (slow, fast) = dead_time::rates(record, &used.branches);
+    if fast < dead_time::RATE_RATIO * slow {
+        let message = format!("one rate ({slow:.0} to {fast:.0} V/s): creep and rate dependence look alike");
+        let help = "append some curves at a rate at least twice as high or low";
+        findings.add(codes::CREEP_FROM_ONE_RATE, None, message, help);
+    }
     let (fold_of, folds, levels) = grid_choice::deal(record, &used.branches, options.drive);
     if folds < FEWEST_FOLDS {
         let message = format!(
@@ -108,13 +115,14 @@ fn chosen(
     };
     let mut scores = Vec::new();
     let mut chosen = None;
+    let worthwhile = WORTHWHILE[0] * mean(&best).sqrt() + WORTHWHILE[1] * table.report.noise_floor * 1e6;
     for candidate in candidates {
         let worse: Vec<f64> = candidate.squares.iter().zip(&best).map(|(a, b)| a.sqrt() - b.sqrt()).collect();
         let (excess, error) = mean_and_error(&worse);
         let held_out_rms = mean(&candidate.squares).sqrt() * 1e-6;
         scores.push(FamilyScore { family: candidate.family, held_out_rms, standard_error: error * 1e-6 });
         // The table has to be as good as the others; among these the price decides.
-        let slack = if candidate.family.kind == Kind::Preisach { 0.0 } else { WORTHWHILE * mean(&best).sqrt() };
+        let slack = if candidate.family.kind == Kind::Preisach { 0.0 } else { worthwhile };
         if chosen.is_none() && (excess <= error || excess <= slack) {
             chosen = candidate.model.map(|model| (candidate.family, model));
         }
@@ -295,8 +303,8 @@ fn model(problem: &Problem, solution: &Solution, plane: &Plane) -> Option<LegMod
             table.nodes.push(gained * 1e-6);
         }
     }
-    let Shape { creep, onward, back, .. } = solution.shape;
-    let (beta, gamma) = if taken > 0.0 { (0.5 * (onward + back), 0.5 * (onward - back)) } else { (0.0, 0.0) };
+    let Shape { creep, beta_plus_gamma: plus, beta_minus_gamma: minus, .. } = solution.shape;
+    let (beta, gamma) = if taken > 0.0 { (0.5 * (plus + minus), 0.5 * (plus - minus)) } else { (0.0, 0.0) };
     // Coefficients of h, then about rest.
     let mut own = [0.0; READ_OUT];
     own[0] = read_out.iter().fold(1.0, |sum, b| sum - b);
@@ -307,8 +315,8 @@ fn model(problem: &Problem, solution: &Solution, plane: &Plane) -> Option<LegMod
     }
     let mut around =
         Around { read_out: own, travel_um: unit, slope: taken, beta, gamma, rest_um: 0.0, creep: terms(creep) };
-    let saturated = if taken > 0.0 { taken / onward } else { 0.0 };
-    around.rest_um = around.lost(saturated, low - high);
+    let saturated = if taken > 0.0 { taken / plus } else { 0.0 };
+    around.rest_um = around.state_after(saturated, low - high);
     let rest = sum(&|r| low + r) - around.rest_um + constant;
     let root = |around: &Around, p: f64| {
         let (mut below, mut above) = (-unit, 2.0 * unit);
@@ -320,12 +328,12 @@ fn model(problem: &Problem, solution: &Solution, plane: &Plane) -> Option<LegMod
     };
     let place = root(&around, rest);
     around.read_out = shifted(&own, place);
-    let full = table.node(plane.grid, 0) * 1e6 - (around.lost(around.rest_um, high - low) - around.rest_um);
+    let full = table.node(plane.grid, 0) * 1e6 - (around.state_after(around.rest_um, high - low) - around.rest_um);
     around.travel_um = root(&around, full);
     around.inverse()?;
     // Monotone: no cell of the diagonal is flatter than the state is steep.
     let cell = (high - low) / plane.grid as f64;
-    let steepest = if taken > 0.0 { taken * if back > 0.0 { 1.0 + back / onward } else { 1.0 } } else { 0.0 };
+    let steepest = if taken > 0.0 { taken * if minus > 0.0 { 1.0 + minus / plus } else { 1.0 } } else { 0.0 };
     let rises = (0..plane.grid).all(|k| table.node(k + 1, k) * 1e6 > steepest * cell);
     rises.then_some(LegModel { table, around: Some(around) })
 }

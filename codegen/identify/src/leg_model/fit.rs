@@ -122,9 +122,9 @@ pub(super) struct Shape {
     /// c.
     pub(super) creep: f64,
     /// β + γ, 1/V.
-    pub(super) onward: f64,
+    pub(super) beta_plus_gamma: f64,
     /// β − γ, 1/V.
-    pub(super) back: f64,
+    pub(super) beta_minus_gamma: f64,
     /// z at the first sample over its largest.
     pub(super) start: f64,
 }
@@ -219,10 +219,10 @@ impl<'a> Problem<'a> {
 
     /// z, V, at each sample.
     fn state(&self, shape: &Shape) -> Vec<f64> {
-        let mut z = shape.start / shape.onward;
+        let mut z = shape.start / shape.beta_plus_gamma;
         let mut before = self.samples.drive[0];
         let advance = |u: &f64| {
-            z = advanced(z, *u - before, shape);
+            z = advanced(z, *u - before, [shape.beta_plus_gamma, shape.beta_minus_gamma]);
             before = *u;
             z
         };
@@ -340,8 +340,8 @@ impl<'a> Problem<'a> {
         let range = self.samples.range[1] - self.samples.range[0];
         let start = near.copied().unwrap_or(Shape {
             creep: if self.family.creeps() { 5e-3 } else { 0.0 },
-            onward: 5.0 / range,
-            back: 1.0 / range,
+            beta_plus_gamma: 5.0 / range,
+            beta_minus_gamma: 1.0 / range,
             start: -0.3,
         });
         let of = |unknowns: &[f64]| {
@@ -349,10 +349,15 @@ impl<'a> Problem<'a> {
                 (true, [c, rest @ ..]) => (saturate(*c * 1e-2, [0.0, MOST_CREEP]), rest),
                 (_, rest) => (0.0, rest),
             };
-            let [onward, share, begun] = *rest else { return Shape { creep, ..start } };
-            let onward = saturate(libm::exp(onward), [0.5, 500.0]) / range;
+            let [beta_plus_gamma, share, begun] = *rest else { return Shape { creep, ..start } };
+            let beta_plus_gamma = saturate(libm::exp(beta_plus_gamma), [0.5, 500.0]) / range;
             let share = saturate(share, [-0.95, 3.0]);
-            Shape { creep, onward, back: share * onward, start: saturate(begun, [-1.0, 1.0]) }
+            Shape {
+                creep,
+                beta_plus_gamma,
+                beta_minus_gamma: share * beta_plus_gamma,
+                start: saturate(begun, [-1.0, 1.0]),
+            }
         };
         let (mut unknowns, mut steps) = (Vec::new(), Vec::new());
         let fine = if near.is_some() { 0.1 } else { 1.0 };
@@ -361,7 +366,11 @@ impl<'a> Problem<'a> {
             steps.push(0.3 * fine);
         }
         if self.family.has_state() {
-            unknowns.extend([libm::log(start.onward * range), start.back / start.onward, start.start]);
+            unknowns.extend([
+                libm::log(start.beta_plus_gamma * range),
+                start.beta_minus_gamma / start.beta_plus_gamma,
+                start.start,
+            ]);
             steps.extend([0.4, 0.3, 0.4].map(|step| step * fine));
         }
         let best = if unknowns.is_empty() {
@@ -401,19 +410,19 @@ fn level(rows: &[f64], width: usize, family: Family) -> Vec<f64> {
     level
 }
 
-/// z after a step of the drive, V: exact on either side of 0.
-fn advanced(z: f64, step: f64, shape: &Shape) -> f64 {
+/// z after a step of the drive, V, with β + γ and β − γ (1/V): exact on either side of 0.
+pub(super) fn advanced(z: f64, step: f64, [plus, minus]: [f64; 2]) -> f64 {
     let direction = if step < 0.0 { -1.0 } else { 1.0 };
     let (mut along, mut left) = (direction * z, step.abs());
     if along < 0.0 {
-        let slope = 1.0 - shape.back * along;
-        let to_zero = if shape.back == 0.0 { -along } else { libm::log(slope) / shape.back };
+        let slope = 1.0 - minus * along;
+        let to_zero = if minus == 0.0 { -along } else { libm::log(slope) / minus };
         if to_zero >= left {
-            return direction * (along + slope * grown(shape.back, left));
+            return direction * (along + slope * grown(minus, left));
         }
         (along, left) = (0.0, left - to_zero);
     }
-    direction * (along + (1.0 - shape.onward * along) * grown(shape.onward, left))
+    direction * (along + (1.0 - plus * along) * grown(plus, left))
 }
 
 /// ∫ e^(−rate s) ds from 0 to `way`.

@@ -42,7 +42,7 @@ pub(super) fn all(
 /// One table for all records with `dead_time` (s).
 fn still(tables: &Tables, dead_time: f64) -> Result<RateModel, Failure> {
     let targets: Vec<Vec<f64>> = tables.records.iter().map(|p| p.delayed(dead_time)).collect();
-    Ok(RateModel { still: tables.fit(&targets)?, rate: None, creep: Vec::new(), inertia: None, dead_time })
+    Ok(RateModel::of_table(tables.fit(&targets)?, dead_time))
 }
 
 /// The dead time (s) with which one table fits all records best, without the bounds of the weights; zero if none helps.
@@ -92,7 +92,7 @@ fn dynamic(plane: &Plane, records: &[&PreparedRecord], dead_times: [f64; 2]) -> 
             let (still, rate) = weights.split_at(nodes);
             let still = normal::table_of(plane, still, 1.0 / scale);
             let rate = Some(normal::table_of(plane, rate, 1.0 / (scale * unit)));
-            best = Some((left, RateModel { still, rate, creep: Vec::new(), inertia: None, dead_time }));
+            best = Some((left, RateModel { rate, ..RateModel::of_table(still, dead_time) }));
         }
     }
     best.map(|(_, model)| model).ok_or(Failure::Singular)

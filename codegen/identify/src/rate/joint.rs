@@ -81,7 +81,7 @@ impl Fit<'_> {
         let mut still = near.still.clone();
         let factor = total(&near.creep) / total(&creep);
         still.nodes.iter_mut().for_each(|node| *node *= factor);
-        let mut model = RateModel { still, rate: None, creep, inertia: None, dead_time };
+        let mut model = RateModel { creep, ..RateModel::of_table(still, dead_time) };
         for pass in 0..PASSES {
             model.inertia = self.shape.mode.map(|mode| Inertia { mode, gain: model.still.reversal_gain() });
             let target = |(p, own): (&&PreparedRecord, &RecordColumns)| self.target(&model, p, own, pass > 0);

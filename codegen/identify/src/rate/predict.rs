@@ -175,7 +175,11 @@ pub fn predict(model: &RateModel, drive: &Drive) -> Result<Prediction, Vec<Diagn
             memory.push(top);
         }
         memory.push(drive.drive[first]);
-        forward::still(model, &plane, &drive.time, &drive.drive, first, memory)
+        let (mut still, rate) = forward::still(model, &plane, &drive.time, &drive.drive, first, memory);
+        if let Some(around) = &model.around {
+            around.complete(&mut still, &drive.drive[first..], plane.range, full);
+        }
+        (still, rate)
     };
     let (below, above) = (run(false), run(true));
     let open: Vec<f64> = above.0.iter().zip(&below.0).map(|(a, b)| a - b).collect();

@@ -36,7 +36,7 @@ pub struct Options {
 /// The contribution of a mode: the given one, else the model's, else one fitted to ringing in the record.
 fn inertia(options: &Options, model: &RateModel, drive: &Drive) -> Option<Inertia> {
     let ring = || mode::ring(&drive.time, &drive.drive, drive.displacement.as_ref()?).map(|ring| ring.mode);
-    let gain = model.inertia.map_or_else(|| model.still.reversal_gain(), |own| own.gain);
+    let gain = model.inertia.map_or_else(|| model.reversal_gain(), |own| own.gain);
     let found = match (options.mode, model.inertia) {
         (Some(mode), _) => mode,
         (None, Some(own)) => Some(own.mode),
@@ -77,18 +77,13 @@ fn model(path: &Path, leg: usize, ui: &mut Ui) -> Result<RateModel, Failure> {
         let model = spec_file::model(path)?;
         let declared = declared::records(&model, dir).map_err(refused)?;
         ui.findings(None, &declared.warnings);
-        declared.tables_only().map_err(|why| Failure::Gate(format!("{}: {why}", path.display())))?;
         return declared
             .leg(&model, leg)
             .ok_or_else(|| Failure::Usage(format!("`{}` has no records in hysteresis.records", path.display())));
     }
     let shown = path.display().to_string();
     let text = read_file(path, &shown).map_err(refused)?;
-    let found = read_leg_csv(&text, &shown).map_err(refused)?;
-    if found.around.is_some() {
-        return Err(Failure::Gate(format!("{shown}: a leg model; this command predicts tables only")));
-    }
-    Ok(RateModel::of_table(found.table, 0.0))
+    Ok(RateModel::of_leg(read_leg_csv(&text, &shown).map_err(refused)?))
 }
 
 /// Numbers have the shortest form that reads back exactly.

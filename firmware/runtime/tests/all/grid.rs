@@ -239,8 +239,8 @@ fn every_model<T: Real, const N: usize, const NODES: usize, const CAP: usize>(se
         inverse: [0.98, 576.0, -3e6, 0.0, 0.0].map(T::from_f64),
         travel: [-1e-6, 62e-6].map(T::from_f64),
         slope: T::from_f64(4e-7),
-        onward: T::from_f64(0.2),
-        back: T::from_f64(0.1),
+        beta_plus_gamma: T::from_f64(0.2),
+        beta_minus_gamma: T::from_f64(0.1),
         limit: T::from_f64(2e-6),
         rest: T::from_f64(-1.9e-6),
     };

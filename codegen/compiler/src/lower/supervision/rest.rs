@@ -52,14 +52,14 @@ pub(super) fn risen(code: i32, hysteresis: &Hysteresis, actuation: &Actuation, s
     const STEPS: u32 = 4096;
     let at_rest = |leg: usize| {
         let (own, step) = (&legs[leg], drive / f64::from(STEPS));
-        let rate = |z: f64| own.slope - if z < 0.0 { own.back } else { own.onward } * z;
-        let lost = (0..STEPS).fold(own.rest, |z, _| z + step * rate(z + 0.5 * step * rate(z)));
-        let p = displacement[leg] - (lost - own.rest);
+        let rate = |z: f64| own.slope - if z < 0.0 { own.beta_minus_gamma } else { own.beta_plus_gamma } * z;
+        let z = (0..STEPS).fold(own.rest, |z, _| z + step * rate(z + 0.5 * step * rate(z)));
+        let p = displacement[leg] - (z - own.rest);
         let h = own.inverse.iter().rev().fold(0.0, |sum, c| (sum + c) * p);
-        [displacement[leg], scalar.round(lost), scalar.round(h)]
+        [displacement[leg], scalar.round(z), scalar.round(h)]
     };
     let all: [[f64; 3]; LEGS] = core::array::from_fn(at_rest);
-    let parts = all.map(|[still, lost, _]| [still, lost]);
+    let parts = all.map(|[still, z, _]| [still, z]);
     Some(Rest { drive, displacement: all.map(|[.., h]| h), rate, bouc_wen: Some(parts) })
 }
 
