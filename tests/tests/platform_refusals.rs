@@ -162,8 +162,8 @@ fn refused(case: &Case, folder: &Path) -> String {
 #[test]
 fn what_is_refused_has_a_fix_that_is_accepted() {
     let folder = folder();
-    // Every fifth in the short run.
-    cases::hold(&repository().join("tests/cases/platform_refusals.txt"), length(5, 1), |case| {
+    // Every tenth in the short run.
+    cases::hold(&repository().join("tests/cases/platform_refusals.txt"), length(10, 1), |case| {
         refused(case, folder.path())
     });
 }

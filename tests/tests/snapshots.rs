@@ -102,12 +102,12 @@ fn changed_snapshots_are_refused_or_harmless(name: &str, spec: &str, edits: &[(&
     let mut loaded = course.machine.fork();
     // By how much the largest changed word was changed: the first are those nearest to a bound.
     let mut accepted: Vec<(f64, Vec<u64>)> = Vec::new();
-    let most = length(40, 2_500);
+    let most = length(40, 1_000);
     // Of what was changed by less there is enough.
     let mut enough = -1.0;
     let (mut refused, mut taken) = (0_u64, 0_u64);
     let mut words = originals[0].clone();
-    for number in 0..length(30_000_u64, 25_000_000) {
+    for number in 0..length(30_000_u64, 6_000_000) {
         let original = &originals[number as usize % originals.len()];
         words.copy_from_slice(original);
         let places = changed(&mut words, &mut draw, scalar);

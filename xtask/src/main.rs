@@ -26,6 +26,8 @@ const USAGE: &str = "usage: cargo xtask COMMAND
   test --full
           runs all tests at full length, board images, faults and documentation, and checks packages for known defects; writes
           tests/results.txt
+  test --checks
+          runs only the part of the full run that is neither its tests nor its board images
   mutants [MINUTES | K/N | all]: mutation tests, as samples for a given time, one sample, or all; writes tests/results.txt
   board   SPEC [--target BOARD] [--cycles | --faults [NAME]], or --tested [--faults]: runs a board's image on an emulated board, from
           boot to a record that replays; with times by a model of the core, with all faults, or with one
@@ -46,6 +48,7 @@ fn main() -> ExitCode {
     match words[..] {
         ["test"] => steps::test(&root()),
         ["test", "--full"] => steps::full(&root()),
+        ["test", "--checks"] => steps::checks(&root()),
         ["mutants", ref more @ ..] => {
             mutants::Sample::of(more).map_or_else(misused, |sample| steps::mutants(&root(), &sample))
         }

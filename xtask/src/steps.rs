@@ -136,20 +136,48 @@ pub fn test(root: &Path) -> ExitCode {
 /// `cargo xtask test --full`
 pub fn full(root: &Path) -> ExitCode {
     let start = Instant::now();
-    let mut report = Report::new(13);
+    let mut report = Report::new(8);
     report.step("known defects of packages", || packages::advisories(root, &with_boards(root, &LOCKED)));
     let binaries = compiled(root, true, &mut report);
     let mode = Mode { full: true, tools_missing: !set_up(root, &mut report) };
     let mut ran = TestResults::default();
     report.step("tests at full length", || binaries::test(root, &binaries, mode, &mut ran));
-    report.step("images on the emulated board, and faults", || maintained(root, &["boards"]));
-    report.step("lock file and licences of examples/own-board/Cargo.toml", || {
-        if root.join(OWN_BOARD).is_file() {
-            packages::check(root, OWN_BOARD)
-        } else {
-            setup::missing(format!("{OWN_BOARD} is missing; the test of the boards creates it"))
-        }
+    // Emulated boards take one processor, so what compiles and needs no tools runs beside them. At the lowest priority, because their
+    // hosts time out if they get half a processor.
+    std::thread::scope(|scope| {
+        let beside = scope.spawn(|| {
+            let own = std::env::current_exe()?;
+            Command::new("nice").args(["-n", "19"]).arg(own).args(["test", "--checks"]).current_dir(root).output()
+        });
+        report.step("images on the emulated board, and faults", || maintained(root, &["boards"]));
+        report.step("lock file and licences of examples/own-board/Cargo.toml", || {
+            if root.join(OWN_BOARD).is_file() {
+                packages::check(root, OWN_BOARD)
+            } else {
+                setup::missing(format!("{OWN_BOARD} is missing; the test of the boards creates it"))
+            }
+        });
+        report.step("checks, beside the boards", || match beside.join() {
+            Ok(Ok(output)) => {
+                println!("{}", String::from_utf8_lossy(&[output.stdout, output.stderr].concat()).trim());
+                if output.status.success() {
+                    Outcome::Passed
+                } else {
+                    Outcome::Failed("see above; run: cargo xtask test --checks".to_owned())
+                }
+            }
+            Ok(Err(error)) => Outcome::Failed(format!("nice cannot be run: {error}")),
+            Err(_) => Outcome::Failed("the thread that runs them ended early".to_owned()),
+        });
     });
+    let (good, tests) = (!report.has_failed(), results::of_tests(&ran, start.elapsed()));
+    report.step("result of the full run", || results::write(root, results::FULL, good, &tests));
+    report.finish()
+}
+
+/// `cargo xtask test --checks`: the part of the full run that runs beside the emulated boards.
+pub fn checks(root: &Path) -> ExitCode {
+    let mut report = Report::new(6);
     report.step("tests with all checks", || checked(root));
     report.step("lints of all packages", || lints(root, true));
     report.step("examples in the documentation", || binaries::examples(root));
@@ -160,8 +188,6 @@ pub fn full(root: &Path) -> ExitCode {
     });
     report.step("published schema", || separate(root, SCHEMA));
     report.step("shared-memory ordering", || separate(root, LOOM));
-    let (good, tests) = (!report.has_failed(), results::of_tests(&ran, start.elapsed()));
-    report.step("result of the full run", || results::write(root, results::FULL, good, &tests));
     report.finish()
 }
 

@@ -166,8 +166,8 @@ fn judged(code: Code, page: &str, known: &Known) -> Result<bool, String> {
 #[test]
 fn every_example_gives_its_finding_and_every_fix_removes_it() {
     let (next, known) = (AtomicUsize::new(0), Known::default());
-    // In the short run, every tenth.
-    let codes: Vec<Code> = specgen::findings::all().into_iter().step_by(crate::support::length(10, 1)).collect();
+    // In the short run, every twentieth.
+    let codes: Vec<Code> = specgen::findings::all().into_iter().step_by(crate::support::length(20, 1)).collect();
     let judge = || {
         let next = || codes.get(next.fetch_add(1, Ordering::Relaxed));
         std::iter::from_fn(next).map(|code| judged(*code, &code.page(), &known)).collect::<Vec<_>>()

@@ -75,7 +75,7 @@ fn raised(rule: &Case, dir: &Path, bases: &mut Expectations) -> Result<String, S
 fn every_rule_has_its_boundary() {
     let dir = specgen_tests::repository().join("specs");
     let mut bases = Expectations::new();
-    cases::hold(&file(), specgen_tests::length(16, 1), |rule| {
+    cases::hold(&file(), specgen_tests::length(32, 1), |rule| {
         raised(rule, &dir, &mut bases).unwrap_or_else(|wrong| panic!("{wrong}"))
     });
     // No rule is left out; that of steps in a table of poses has a test of its own.
@@ -87,6 +87,7 @@ fn every_rule_has_its_boundary() {
 }
 
 #[test]
+#[ignore = "long: a rule changed in four ways; that a case with another outcome fails is in the short run"]
 fn the_test_of_rules_knows_a_wrong_one() {
     let dir = specgen_tests::repository().join("specs");
     let rules = cases::read(&file());

@@ -11,9 +11,9 @@ use crate::platform_tables::bench::in_parallel;
 /// Share of the largest speed of a stream: 0.2, 0.5, 1, 2 and 5 mm/s, or ten times as many µrad/s.
 const SPEEDS: [f64; 5] = [0.04, 0.1, 0.2, 0.4, 1.0];
 
-/// From 1 mm/s on in the short run.
+/// From 2 mm/s on in the short run.
 fn speeds() -> &'static [f64] {
-    &SPEEDS[length(2, 0)..]
+    &SPEEDS[length(3, 0)..]
 }
 
 /// What hysteresis that depends on the rate, which the controllers' tables do not hold, leaves of an error at any speed, m.

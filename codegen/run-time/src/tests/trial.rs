@@ -61,15 +61,24 @@ impl Trial {
         Self(parts)
     }
 
-    /// Digests of the trial, up to the first that differs from the expected one.
-    pub fn digests(&self, controller: &Controller, expected: Option<&[u64]>) -> Vec<u64> {
-        let mut seen = DigestTrail { digests: Vec::new(), expected };
-        for part in &self.0 {
-            if part.run(controller.fork(), &mut seen) {
-                break;
-            }
-        }
-        seen.digests
+    /// Digests of each part.
+    pub fn digests(&self, controller: &Controller) -> Vec<Vec<u64>> {
+        let of = |part: &Part| {
+            let mut seen = DigestTrail { digests: Vec::new(), expected: None };
+            part.run(controller.fork(), &mut seen);
+            seen.digests
+        };
+        self.0.iter().map(of).collect()
+    }
+
+    /// A part whose digests differ from the expected ones; `first` is tried before the others.
+    pub fn differs_in(&self, controller: &Controller, expected: &[Vec<u64>], first: usize) -> Option<usize> {
+        let others = (0..self.0.len()).filter(|part| *part != first);
+        std::iter::once(first).chain(others).find(|part| {
+            let expected = &expected[*part];
+            let mut seen = DigestTrail { digests: Vec::new(), expected: Some(expected) };
+            self.0[*part].run(controller.fork(), &mut seen) || seen.digests.len() != expected.len()
+        })
     }
 }
 
