@@ -70,6 +70,26 @@ fn is_drawn(folder: &Folder, name: &str, expected: &serde_json::Value) {
     }
 }
 
+/// Asserts that axe-core finds no violation in the page. It runs in a copy of it.
+fn is_accessible(folder: &Folder, name: &str) {
+    let Some(axe) = support::axe() else { return };
+    let check = format!(
+        "document.documentElement.dataset.axe = 'runs'; {}.then(text => {{ document.documentElement.dataset.axe = text || 'none'; }});",
+        support::VIOLATIONS
+    );
+    let page = folder.read(name);
+    folder.write("axe.js", axe);
+    let scripts = "<script src=\"axe.js\"></script><script>addEventListener('load', () => {";
+    folder.write("axe.html", format!("{page}{scripts} {check} }});</script>"));
+    for width in [1280, 390] {
+        let Some(drawn) = drawn(&folder.path("axe.html"), width) else {
+            return support::skipped("no chromium: the page is not drawn");
+        };
+        let found = drawn.dom.split("data-axe=\"").nth(1).and_then(|rest| rest.split('"').next());
+        assert_eq!(found, Some("none"), "{name}, {width} px");
+    }
+}
+
 /// Asserts that the page ends with the numbers of its figures, with as many tables as its heading says.
 #[track_caller]
 fn has_numbers(page: &str) {
@@ -259,6 +279,19 @@ fn a_page_with_an_empty_figure_or_an_error_is_seen() {
         Some(drawn) => assert_eq!(drawn.console.len(), 1, "{:?}", drawn.console),
         None => support::skipped("no chromium: console errors are not seen"),
     }
+}
+
+#[test]
+fn a_report_violates_no_rule_of_accessibility_and_names_the_board_of_the_spec() {
+    let folder = Folder::new();
+    folder.spec("board.toml", &[("mcu = \"mps2-an500\"", "mcu = \"stm32h743zi\"")]);
+    folder.json(&["report", "board.toml", "-o", "board.html", "--no-target"]);
+    let page = folder.read("board.html");
+    let board = "NUCLEO-H743ZI2";
+    for place in [format!("<title>board.toml: report for {board}<"), format!("Controller on {board}<")] {
+        assert!(page.contains(&place), "{place}");
+    }
+    is_accessible(&folder, "board.html");
 }
 
 #[test]

@@ -12,6 +12,7 @@ mod clients;
 mod control;
 mod http;
 mod request;
+mod rest;
 mod samples;
 mod status;
 mod wiring;
@@ -31,6 +32,7 @@ use specgen_language::outcome::Failure;
 use specgen_language::ui::Ui;
 use specgen_link::Refusal;
 use specgen_link::client::{ClientError, Port};
+use specgen_runtime::setpoint::BUSY;
 use specgen_runtime::supervisor::{Phase, Request};
 
 use crate::commands::{MachineStatus, Operator, Pulse, Service, SessionError, is_gain, lost_link, recoverable};
@@ -38,6 +40,7 @@ use crate::samples::Block;
 use crate::session::Session;
 use clients::{Clients, now};
 use control::{carry_out, queries};
+use rest::RestError;
 use status::StatusMessage;
 
 /// Interval of messages with samples.
@@ -76,6 +79,8 @@ struct Panel {
     known: Value,
     check: Value,
     wave: Value,
+    /// Error of a machine that runs at rest.
+    rest: RestError,
 }
 
 /// State of machine and panel, for pages.
@@ -111,12 +116,14 @@ pub fn device_facts(
     Ok([("device", json!(name)), ("ramp", json!(ramp)), ("trajectories", json!(motion.trajectories()))])
 }
 
-/// Serves `page` at an address until Ctrl-C, and operates the machine as the pages request; then ramps down.
+/// Serves `page` at an address until Ctrl-C, and operates the machine as the pages request; then ramps down. If the link breaks, it
+/// calls `reopen` until the machine answers again.
 ///
 /// # Errors
-/// The address is in use, the device sends no samples, or the link broke.
+/// The address is in use, the device sends no samples, or the link is broken at the end.
 pub fn serve<P: Port + 'static>(
     session: Session<P>,
+    reopen: impl Fn() -> Result<Session<P>, Failure>,
     name: &str,
     compiled: Compilation,
     listen: SocketAddr,
@@ -144,10 +151,23 @@ pub fn serve<P: Port + 'static>(
         other => lost_link(name, &other),
     })?;
     operator.pulse = Some(pulse(panel.clone()));
-    let ending = operate(&mut operator, &panel, ui);
+    let ending = loop {
+        match operate(&mut operator, &panel, ui) {
+            SessionError::Link(error) => {
+                let failure = lost_link(name, &error);
+                ui.progress(&format!("{name}: {error}; reconnecting"));
+                let Some(session) = panel.borrow_mut().reconnect(&operator, &reopen) else {
+                    break SessionError::Failed(failure);
+                };
+                // `in_control` stays: without a page in control, this host must not keep a machine running that it controlled.
+                operator.session = session;
+                ui.progress(&format!("{name}: connected again"));
+            }
+            other => break other,
+        }
+    };
     operator.pulse = None;
     let left = match ending {
-        SessionError::Link(error) => Err(lost_link(name, &error)),
         SessionError::Failed(failure) => Err(failure),
         _ if operator.is_powered() => operator.ramp_down(ui).map_err(|error| lost_link(name, &error)),
         _ => Ok(operator.state()),
@@ -220,6 +240,10 @@ fn round<P: Port + 'static>(
                 Ok(())
             }
             Err(error) => {
+                if let SessionError::Link(error) = &error {
+                    let why = format!("the link broke, and the machine may have received it: {error}");
+                    panel.borrow().clients.answer(page, id, Err(&why));
+                }
                 if let Some(why) = recoverable(Err(error), quiet)? {
                     panel.borrow().clients.answer(page, id, Err(&why));
                 }
@@ -229,7 +253,9 @@ fn round<P: Port + 'static>(
     }
     if queried.elapsed() >= QUERY {
         *queried = Instant::now();
-        let known = queries(operator, quiet)?;
+        // The pulse of a query borrows the panel.
+        let settings = panel.borrow().compiled.ir.integrity.settings.clone();
+        let known = queries(operator, &settings, quiet)?;
         panel.borrow_mut().known = known;
     }
     Ok(())
@@ -257,7 +283,50 @@ impl Panel {
             known: json!({}),
             check: Value::Null,
             wave: Value::Null,
+            rest: RestError::default(),
         }
+    }
+
+    /// Waits for a new session while the link is broken, and tells the pages; none after Ctrl-C. Commands of pages are refused, but a
+    /// requested stop is sent once there is a session.
+    fn reconnect<P: Port>(
+        &mut self,
+        operator: &Operator<P>,
+        reopen: impl Fn() -> Result<Session<P>, Failure>,
+    ) -> Option<Session<P>> {
+        self.clients.note("warning", "The link to the machine broke.", "", None);
+        // What the machine did meanwhile is unknown.
+        (self.next, self.published, self.wave, self.known) = (None, None, Value::Null, json!({}));
+        self.blocks.clear();
+        let mut tried = Instant::now();
+        let mut why = String::new();
+        while !operator.is_interrupted() {
+            self.clients.listen(LOOK);
+            while let Some((page, command)) = self.clients.next() {
+                self.clients.answer(page, command.id(), Err("no link to the machine"));
+            }
+            if self.stated.elapsed() >= STATE {
+                self.stated = Instant::now();
+                self.clients.publish(&json!({ "k": "lost", "t": now(), "why": why }));
+            }
+            if tried.elapsed() < STATE {
+                continue;
+            }
+            let opened = reopen().map(|mut session| self.begin(&mut session).map(|()| session));
+            // An attempt at a device that does not answer takes seconds, in which pages are not heard.
+            self.clients.excuse();
+            match opened {
+                Ok(Ok(session)) => {
+                    self.clients.note("note", "The machine answers again.", "", None);
+                    return Some(session);
+                }
+                Ok(Err(error)) => why = error.to_string(),
+                Err(Failure::Environment(text) | Failure::Gate(text)) => why = text,
+                Err(_) => {}
+            }
+            tried = Instant::now();
+        }
+        None
     }
 
     /// Starts the stream of samples, at the highest useful rate that the line permits.
@@ -318,6 +387,7 @@ impl Panel {
                 self.lost.0 += block.tick.saturating_sub(tick);
             }
             self.next = Some((block.number.wrapping_add(1), block.end()));
+            self.rest.add(&block, session.period());
             self.blocks.push(block);
         }
         if self.lost.0 > 0 && self.lost.1.elapsed() >= QUERY {
@@ -339,7 +409,16 @@ impl Panel {
     fn publish<P: Port>(&mut self, operator: &Operator<P>) {
         let status = operator.session.status();
         let current = ((status.phase, status.cause, status.finding), status.late);
-        let message = status::message(status, &self.compiled.ir.supervision, &self.compiled.model);
+        let (rules, model) = (&self.compiled.ir.supervision, &self.compiled.model);
+        let mut message = status::message(status, rules, model);
+        if message.kind == "ok" && status.status & BUSY == 0 {
+            message = self.rest.message(rules, model);
+        }
+        if message.kind == "ok" && self.known["differ"].as_array().is_some_and(|names| !names.is_empty()) {
+            message.kind = "warning";
+            message.what = "Running. Settings differ from the spec.".to_owned();
+            message.advice = "Restore those of the spec, or write these into it.";
+        }
         if let Some(before) = self.published.replace(current) {
             if before.0 != current.0 {
                 self.clients.note(

@@ -104,7 +104,7 @@ fn reach_card(compiled: &Compilation, verdict: &Verdict) -> String {
 
 fn error_card(verdict: &Verdict, errors: Errors) -> Vec<Part> {
     let mut head =
-        "<div class=\"card\" data-choices><div class=\"head\"><h3>Error on your trajectories</h3>".to_owned();
+        "<div class=\"card\" data-choices><div class=\"head\"><h2>Error on your trajectories</h2>".to_owned();
     if errors.pictures.len() > 1 {
         head += "<span class=\"choice note\" data-axis=\"0\">";
         for (k, (unit, _)) in errors.pictures.iter().enumerate() {
@@ -143,7 +143,7 @@ fn error_card(verdict: &Verdict, errors: Errors) -> Vec<Part> {
 }
 
 fn controller_card(compiled: &Compilation, verdict: &Verdict, measured: Result<&Measurement, &str>) -> String {
-    let machine = measured.map_or_else(|_| compiled.model.target.mcu.part().emulated.to_owned(), |m| m.machine.clone());
+    let part = compiled.model.target.mcu.part();
     let mut content = String::new();
     for figure in verdict.figures.iter().filter(|figure| matches!(figure.subject, Subject::Time | Subject::Memory)) {
         // Shown with the period below.
@@ -179,7 +179,10 @@ fn controller_card(compiled: &Compilation, verdict: &Verdict, measured: Result<&
             let _ = writeln!(content, "<p class=\"legend\">{}</p>", marked(why));
         }
     }
-    card(&format!("Controller on {machine}"), "used of budget", "", &content)
+    // A board is emulated by another machine with its core.
+    let counted = measured.ok().filter(|m| m.machine != part.name);
+    let note = counted.map_or_else(String::new, |m| format!(" · counted on an emulated {}", m.machine));
+    card(&format!("Controller on {}", part.board), &format!("used of budget{note}"), "", &content)
 }
 
 fn margin_card(compiled: &Compilation, verdict: &Verdict, mode: u32) -> String {
@@ -245,7 +248,7 @@ fn platform_card(model: &Model, view: Part, note: &str) -> Vec<Part> {
     let mass = format!("{}", model.platform.mass);
     vec![
         Part::Html(format!(
-            "<div class=\"card platform\"><div class=\"head\"><h3>Platform</h3><span class=\"note\">{}</span></div>\n",
+            "<div class=\"card platform\"><div class=\"head\"><h2>Platform</h2><span class=\"note\">{}</span></div>\n",
             marked(note)
         )),
         view,

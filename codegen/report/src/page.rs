@@ -254,11 +254,9 @@ impl Page {
             } else {
                 String::new()
             };
-            let _ = writeln!(
-                self.out,
-                "<figure class=\"plot\" tabindex=\"0\" role=\"button\" aria-label=\"{}\"{style}>{caption}</figure>",
-                escaped(title)
-            );
+            // Its name is that of the picture that the script draws in it.
+            let _ =
+                writeln!(self.out, "<figure class=\"plot\" tabindex=\"0\" role=\"button\"{style}>{caption}</figure>");
         }
         self.out.push_str("</div>\n</div>\n");
         self.data.insert(multiples.id.clone(), multiples.data());

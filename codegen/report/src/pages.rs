@@ -125,13 +125,11 @@ pub fn run(options: &Options, ui: &mut Ui) -> Result<(), Failure> {
     for section in sections.iter_mut().filter(|section| section.command.is_empty()) {
         section.command.clone_from(&command);
     }
-    let mut head = head(&compiled.source.display_name, &compiled.ir.digest, "report", command);
-    head.versions = format!(
-        "specgen {} · f{} · {}",
-        env!("CARGO_PKG_VERSION"),
-        compiled.ir.scalar.bits(),
-        compiled.model.target.mcu.part().name
-    );
+    let board = compiled.model.target.mcu.part().board;
+    let title = format!("report for {board}");
+    let mut head = head(&compiled.source.display_name, &compiled.ir.digest, &title, command);
+    let of_numbers = format!("f{}", compiled.ir.scalar.bits());
+    head.versions = [concat!("specgen ", env!("CARGO_PKG_VERSION")), &of_numbers, board].join(" · ");
     head.other = paper.as_deref().map(|path| [file_name(path), "Comparison with the paper".to_owned()]);
     let mut page = write(&output, &head, &first, &sections, &behind)?;
     page.verdict = Some(crate::verdict::Sentence::of(&verdict).verdict);
@@ -327,7 +325,7 @@ fn build(compiled: &Compilation, no_target: bool, ui: &Ui) -> Result<Build, Fail
         Err("skipped by --no-target".to_owned())
     } else {
         let mcu = compiled.model.target.mcu;
-        ui.progress(&format!("building and measuring for {}", mcu.part().emulated));
+        ui.progress(&format!("building and measuring for {}", mcu.part().board));
         let measured = target::available()
             .and_then(|_| target::build_image(&folder, mcu, &cache))
             .and_then(|image| verify::measure(&image, &controller.default_config(), &host))

@@ -141,7 +141,7 @@ fn grouped(value: f64, unit: &str, decimals: usize) -> String {
 #[must_use]
 pub fn card(title: &str, note: &str, class: &str, content: &str) -> String {
     format!(
-        "<div class=\"card {class}\"><div class=\"head\"><h3>{}</h3><span class=\"note\">{}</span></div>\n{content}</div>\n",
+        "<div class=\"card {class}\"><div class=\"head\"><h2>{}</h2><span class=\"note\">{}</span></div>\n{content}</div>\n",
         marked(title),
         marked(note)
     )

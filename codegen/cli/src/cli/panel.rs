@@ -31,12 +31,14 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     let compiled = spec_file::looked_up(&arguments.spec, ui)?;
     interrupt::heed();
-    let (session, name) = arguments.line.open(Some(&compiled.ir.digest))?;
+    let digest = compiled.ir.digest.clone();
+    let open = || arguments.line.open(Some(&digest));
+    let (session, name) = open()?;
     let mut facts = facts(&compiled.model, compiled.design.as_ref());
     for (key, value) in panel::device_facts(&session, &name, &compiled)? {
         facts[key] = value;
     }
     let page = html(&format!("{}: panel", compiled.model.name), &facts);
-    ui.result(&panel::serve(session, &name, compiled, arguments.listen, page, ui)?);
+    ui.result(&panel::serve(session, || Ok(open()?.0), &name, compiled, arguments.listen, page, ui)?);
     Ok(())
 }

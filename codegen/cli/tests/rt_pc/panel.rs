@@ -3,24 +3,25 @@
 
 use std::fs;
 use std::io::{BufRead, BufReader, Write};
-use std::net::TcpStream;
+use std::net::{Shutdown, TcpStream};
+use std::os::unix::net::{UnixListener, UnixStream};
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use rustix::process::Signal;
 use serde_json::{Value, json};
 use specgen::{compile, machine, plant_server};
-use specgen_link::Status;
+use specgen_link::{Request, Status};
 use specgen_rt::exchange::{Server, path_of};
 use tungstenite::client::IntoClientRequest;
 use tungstenite::{Message, WebSocket};
 
 use super::host::Host;
-use super::{Bench, HOLDING, LINK_LOST, ProcessGuard, Record, signal, wait_for};
+use super::{Bench, FAULTED, HOLDING, LINK_LOST, ProcessGuard, RAMP_DOWN, Record, signal, wait_for};
 
 mod browser;
 
@@ -110,7 +111,7 @@ impl Page {
             Message::Text(text) => {
                 let value: Value = serde_json::from_str(text).unwrap();
                 match value["k"].as_str() {
-                    Some("state" | "left") => {
+                    Some("state" | "left" | "lost") => {
                         self.state = value;
                         self.say(&json!({ "do": "seen", "number": 0 }));
                     }
@@ -141,7 +142,7 @@ impl Page {
         None
     }
 
-    fn wait(&mut self, what: &str, there: impl Fn(&Value) -> bool) {
+    fn wait(&mut self, what: &str, mut there: impl FnMut(&Value) -> bool) {
         let start = Instant::now();
         while !there(&self.state) {
             assert!(start.elapsed() < LONG, "{what}: {:#}", self.state);
@@ -252,6 +253,12 @@ fn pages_operate_a_machine_one_is_in_control_and_a_page_that_leaves_is_a_host_th
     assert!(answer["ok"] == false && answer["why"].as_str().unwrap().starts_with("not sent: E"), "{answer}");
     let gains = first.done(json!({ "do": "gain", "factor": 0.5 }));
     assert!(gains["gain_ratio_limit"].as_f64().unwrap() > 1.1, "{gains}");
+    // Settings that differ from the spec are named until they are restored.
+    first.wait("changed gains", |state| {
+        state["known"]["differ"].as_array().is_some_and(|names| names.contains(&json!("kp")))
+    });
+    first.done(json!({ "do": "restore" }));
+    first.wait("the gains of the spec", |state| state["known"]["differ"] == json!([]));
     for line in ["config write x.toml", "record download /tmp/x", "stop", "wait 5", "fly"] {
         assert_eq!(first.line(line)["ok"], false, "{line}");
     }
@@ -317,6 +324,111 @@ fn pages_operate_a_machine_one_is_in_control_and_a_page_that_leaves_is_a_host_th
     }
     panel.end();
     bench.check(&running.end(Signal::TERM), "panel.rec");
+}
+
+/// A socket in front of that of the program, whose connections can be cut.
+#[derive(Clone, Default)]
+struct Relay {
+    is_cut: Arc<AtomicBool>,
+    streams: Arc<Mutex<Vec<UnixStream>>>,
+}
+
+impl Relay {
+    fn new(path: &Path, program: &Path) -> Self {
+        let (listener, relay) = (UnixListener::bind(path).unwrap(), Self::default());
+        let (shared, program) = (relay.clone(), program.to_owned());
+        std::thread::spawn(move || {
+            for host in listener.incoming().map_while(Result::ok) {
+                let mut streams = shared.streams.lock().unwrap();
+                // Without the program, the host sees a closed connection.
+                let Some(device) = UnixStream::connect(&program).ok().filter(|_| !shared.is_cut.load(Ordering::SeqCst))
+                else {
+                    continue;
+                };
+                for (from, to) in [(&host, &device), (&device, &host)] {
+                    let (mut from, mut to) = (from.try_clone().unwrap(), to.try_clone().unwrap());
+                    std::thread::spawn(move || {
+                        let _ = std::io::copy(&mut from, &mut to);
+                        let _ = to.shutdown(Shutdown::Both);
+                    });
+                }
+                streams.extend([host, device]);
+            }
+        });
+        relay
+    }
+
+    fn cut(&self) {
+        let mut streams = self.streams.lock().unwrap();
+        self.is_cut.store(true, Ordering::SeqCst);
+        for stream in streams.drain(..) {
+            let _ = stream.shutdown(Shutdown::Both);
+        }
+    }
+
+    fn mend(&self) {
+        self.is_cut.store(false, Ordering::SeqCst);
+    }
+}
+
+#[test]
+fn the_panel_reconnects_after_a_cut_that_is_a_fault_and_after_a_restart_and_the_same_page_is_in_control() {
+    let bench = Bench::named("reference.toml", "reconnect");
+    let [link, front] = ["program.link", "front.link"].map(|name| bench.path(name));
+    let running = program(&bench, "cut.rec", &bench.name, &link);
+    let relay = Relay::new(&front, &link);
+    let panel = Panel::new(&bench.spec, &front);
+    let mut page = panel.page();
+    page.phase("disarmed");
+    page.takes_control();
+    page.runs();
+
+    // The controller is without its host: it holds with a cause, and ends faulted.
+    relay.cut();
+    let mut watcher = Host::open(&link, 1).unwrap();
+    page.wait("a lost link", |state| state["k"] == "lost");
+    page.refused(json!({ "do": "begin", "request": "run" }), "no link to the machine");
+    page.wait("the loss", |_| {
+        let status = watcher.status();
+        (status.phase, status.cause) == (HOLDING, LINK_LOST)
+    });
+    watcher.done(&Request::Supervise { request: RAMP_DOWN });
+    page.wait("the fault", |state| state["k"] == "lost" && watcher.status().phase == FAULTED);
+    // It took control by its request.
+    drop(watcher);
+
+    // The page says so when it has a link, and the operator goes on. No other page has got control.
+    relay.mend();
+    page.phase("faulted");
+    assert_eq!(page.state["said"]["what"], "The host was silent.");
+    assert_eq!(page.state["mine"], true);
+    assert!(page.events.iter().any(|text| text == "The machine answers again."), "{:?}", page.events);
+    let mut other = panel.page();
+    other.phase("faulted");
+    other.refused(json!({ "do": "begin", "request": "acknowledge" }), "is not in control");
+    drop(other);
+    page.done(json!({ "do": "begin", "request": "acknowledge" }));
+    page.phase("disarmed");
+    page.runs();
+    page.say(&json!({ "do": "ramp-down" }));
+    page.phase("disarmed");
+
+    // The program ends and starts again; address, token and control stay. A stop from meanwhile is sent.
+    let output = running.end(Signal::TERM);
+    page.wait("a lost link", |state| state["k"] == "lost");
+    page.say(&json!({ "do": "ramp-down" }));
+    let running = program(&bench, "again.rec", &bench.name, &link);
+    page.phase("disarmed");
+    panel.page().phase("disarmed");
+    let stops = |page: &Page| page.events.iter().filter(|text| text.contains("requested: ramp down")).count();
+    page.wait("control", |state| state["mine"] == true);
+    assert_eq!(stops(&page), 2, "{:?}", page.events);
+    page.runs();
+    page.say(&json!({ "do": "ramp-down" }));
+    page.phase("disarmed");
+    panel.end();
+    bench.check(&output, "cut.rec");
+    bench.check(&running.end(Signal::TERM), "again.rec");
 }
 
 fn nobody_gets_in_without_the_token_or_from_elsewhere(panel: &Panel) {

@@ -244,6 +244,26 @@ pub fn length<T>(short: T, long: T) -> T {
     if std::env::var_os("SPECGEN_FULL").is_some() { long } else { short }
 }
 
+/// The script of axe-core, which finds violations of accessibility rules: the file that `SPECGEN_AXE` names, or the one that
+/// `npm install --global axe-core` installs. None, with a message, if there is neither.
+pub fn axe() -> Option<String> {
+    let installed = || {
+        let output = Command::new("npm").args(["root", "--global"]).stderr(Stdio::null()).output().ok()?;
+        let root = String::from_utf8(output.stdout).ok()?;
+        Some(Path::new(root.trim()).join("axe-core/axe.min.js"))
+    };
+    let file = std::env::var_os("SPECGEN_AXE").map(PathBuf::from).or_else(installed);
+    let script = file.and_then(|file| fs::read_to_string(file).ok());
+    if script.is_none() {
+        skipped("no axe-core (npm install --global axe-core): accessibility of the pages is not checked");
+    }
+    script
+}
+
+/// An expression for a browser with the script of [`axe`]: a promise of one line for each rule that the page violates.
+pub const VIOLATIONS: &str =
+    r"axe.run().then(run => run.violations.map(v => `${v.impact} ${v.id}: ${v.nodes.map(n => n.target)}`).join('\n'))";
+
 /// Cross compiler and emulator; none, with a message, if one is missing and not required.
 pub fn tools() -> Option<Tools> {
     target::found_or_skipped(target::available()).unwrap_or_else(|error| panic!("{error}"))

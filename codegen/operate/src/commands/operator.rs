@@ -503,7 +503,7 @@ impl<P: Port> Operator<P> {
     }
 
     /// Sends all settings. `refused` is the message about a setting of this name that the device refuses.
-    pub(super) fn configure(&mut self, words: &[u64], refused: impl Fn(&str) -> String) -> Result<(), SessionError> {
+    pub(crate) fn configure(&mut self, words: &[u64], refused: impl Fn(&str) -> String) -> Result<(), SessionError> {
         self.in_control = true;
         self.session.write_config(words).map_err(|error| match error {
             ClientError::Refused(Refusal::Word { index }) => {

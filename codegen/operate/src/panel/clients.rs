@@ -62,6 +62,10 @@ pub enum PageRequest {
         id: u32,
         factor: f64,
     },
+    /// Sets all settings to those of the spec.
+    Restore {
+        id: u32,
+    },
     Download {
         id: u32,
     },
@@ -163,6 +167,11 @@ impl Clients {
         if self.offered.is_some_and(|since| since.elapsed() >= ANSWER) {
             self.offered = None;
         }
+    }
+
+    /// Excuses the silence of pages up to now: they were not heard.
+    pub fn excuse(&mut self) {
+        self.pages.iter_mut().for_each(|page| page.heartbeat = Instant::now());
     }
 
     fn handle(&mut self, event: ClientEvent) {
@@ -366,6 +375,7 @@ impl PageRequest {
             | Self::Begin { id, .. }
             | Self::Wave { id, .. }
             | Self::Gain { id, .. }
+            | Self::Restore { id }
             | Self::Download { id }
             | Self::Check { id } => *id,
             _ => 0,

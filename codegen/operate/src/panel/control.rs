@@ -19,8 +19,13 @@ use specgen_language::ui::Ui;
 /// Type number of a message with a record.
 const RECORD: u32 = 2;
 
-/// Queries health, reach of each axis, recorder and gains. Queries that the device does not support are omitted.
-pub(super) fn queries<P: Port>(operator: &mut Operator<P>, quiet: &mut Ui) -> Result<Value, SessionError> {
+/// Queries health, reach of each axis, recorder, gains, and the settings that differ from those of the spec. Queries that the device
+/// does not support are omitted.
+pub(super) fn queries<P: Port>(
+    operator: &mut Operator<P>,
+    of_spec: &[u64],
+    quiet: &mut Ui,
+) -> Result<Value, SessionError> {
     let mut known = json!({});
     let commands = [
         ("standing", Command::Status),
@@ -35,6 +40,19 @@ pub(super) fn queries<P: Port>(operator: &mut Operator<P>, quiet: &mut Ui) -> Re
             Err(error) => {
                 recoverable(Err(error), quiet)?;
             }
+        }
+    }
+    match operator.session.config() {
+        Ok(words) => {
+            let names = &operator.session.description().config_names;
+            let differ = names.iter().zip(words.iter().zip(of_spec)).filter(|(_, (word, of_spec))| word != of_spec);
+            // `kp[0]` to `kp[5]` are one setting for a reader.
+            let mut differ: Vec<&str> = differ.map(|(name, _)| name.split('[').next().unwrap_or(name)).collect();
+            differ.dedup();
+            known["differ"] = json!(differ);
+        }
+        Err(error) => {
+            recoverable(Err(error.into()), quiet)?;
         }
     }
     Ok(known)
@@ -93,6 +111,17 @@ pub(super) fn carry_out<P: Port + 'static>(
                 None,
             );
             Ok(value)
+        }
+        PageRequest::Restore { .. } => {
+            let settings = panel.borrow().compiled.ir.integrity.settings.clone();
+            operator.configure(&settings, |name| format!("the device refused `{name}` of the spec"))?;
+            panel.borrow_mut().clients.note(
+                "note",
+                &format!("Page {page} restored the settings of the spec."),
+                "",
+                None,
+            );
+            Ok(Value::Null)
         }
         PageRequest::Download { .. } => {
             let record = operator.record()?;

@@ -6,7 +6,7 @@
   const samples = new Samples(facts.period), strips = new Strips(by("strips"), samples), legs = new Legs(by("legs"), samples, facts.volts);
   const spectrum = new Spectrum(by("spectrum"), samples, facts.modes);
   const shownAfter = { count: 0, sum: 0, most: 0 };
-  let socket = null, state = null, left = null, ended = "", you = "", row = null, standing = null, arrived = -Infinity, measured = -Infinity, stated = -Infinity, sent = 0, asked = 0, answers = {};
+  let socket = null, state = null, left = null, lost = null, ended = "", you = "", row = null, standing = null, arrived = -Infinity, measured = -Infinity, stated = -Infinity, sent = 0, asked = 0, answers = {};
   let wave = null, pending = null, gapped = 0, lastEvent = 0, pose = null, delay = 500;
 
   // Live platform view, with motion magnified by a round factor.
@@ -64,9 +64,11 @@
       if (!message.ok) note("warning", message.why + (/[.!]$/.test(message.why) ? "" : "."));
       if (then) then(message);
     } else if (message.k === "end") { ended = message.why; state = null; }
+    else if (message.k === "lost") { lost = message; state = left = null; stated = performance.now(); say({ do: "seen", number: sent }); controls(); allow(by("hold"), "", "sent when the link is back"); }
     else {
       const now = performance.now();
       stated = now;
+      lost = null;
       if (message.k === "left") left = message; else { state = message; left = null; }
       if (message.k === "left") state = Object.assign({}, state, { holder: message.holder, mine: message.mine, asked: message.asked, offered: message.offered, pages: message.pages });
       say({ do: "seen", number: sent });
@@ -135,10 +137,10 @@
     const now = performance.now(), live = row && now - arrived < STALE && !left;
     const bad = row ? row.status & GAUGES : GAUGES, read = live && !bad;
     // Without a gauge reading, pose and output tracking are unknown.
-    const error = read ? NAMES.map((_, k) => row.values[13 + 3 * k]) : null, volts = live && bad !== GAUGES ? NAMES.map((_, k) => row.values[31 + 3 * k]) : null;
+    const law = row && row.phase === 2, error = read && law ? NAMES.map((_, k) => row.values[13 + 3 * k]) : null, volts = live && bad !== GAUGES ? NAMES.map((_, k) => row.values[31 + 3 * k]) : null;
     root.dataset.measured = String(Boolean(read));
     by("view").classList.toggle("old", !read);
-    by("pose-age").textContent = read ? "" : "not measured" + (isFinite(measured) ? " for " + duration((now - measured) / 1000) : "");
+    by("pose-age").textContent = read ? "" : "not measured" + (isFinite(measured) ? " for " + duration((now - measured) / 1000) + ": last pose" : "");
     // First, because it reads the width, which must happen before other changes to the layout.
     if (standing && read && standing.every(isFinite)) {
       facts.view.pose = standing.map(v => v * larger);
@@ -146,7 +148,7 @@
     }
     if (now - digits >= DIGITS || !live) {
       digits = now;
-      shownDigits(error);
+      shownDigits(read, error);
       heading(now);
     }
     strips.draw(NAMES, shown5.error);
@@ -158,7 +160,7 @@
     if (!live) Object.assign(shown5, { error: null, volts: null });
     if (now - spectra >= SPECTRUM) {
       spectra = now;
-      const law = row && row.phase === 2;
+      by("spectrum").classList.toggle("old", !error);
       by("spectrum-note").textContent = !live ? "no data" : !read ? "no live spectrum: the pose is not measured" : law ? spectrum.draw(NAMES[spectrum.axis], now) : "no live spectrum: the law is suspended";
     }
     if (pending !== null) {
@@ -176,13 +178,13 @@
   const shown5 = { at: 0, error: null, volts: null };
 
   // Show no digits below the noise.
-  function shownDigits(error) {
+  function shownDigits(read, error) {
     cells.forEach((cell, k) => {
-      const law = row && row.phase === 2, places = k < 3 ? 4 : 3;
-      cell.pose.textContent = error ? fixed(row.values[k] * 1e6, places) : "–";
-      cell.target.textContent = error && law ? fixed(row.values[6 + k] * 1e6, places) : "–";
-      cell.error.textContent = error && law ? (error[k] > 0 ? "+" : "") + fixed(error[k] * 1e9, k < 3 ? 1 : 0) : "–";
-      bar(cell.bar, samples, k, error && law ? error[k] : NaN);
+      const places = k < 3 ? 4 : 3;
+      cell.pose.textContent = read ? fixed(row.values[k] * 1e6, places) : "–";
+      cell.target.textContent = error ? fixed(row.values[6 + k] * 1e6, places) : "–";
+      cell.error.textContent = error ? (error[k] > 0 ? "+" : "") + fixed(error[k] * 1e9, k < 3 ? 1 : 0) : "–";
+      bar(cell.bar, samples, k, error ? error[k] : NaN);
     });
   }
 
@@ -201,8 +203,9 @@
     const known = state && link && !left && ticks(state.status);
     chip.className = "chip" + (!known ? " none" : state.phase === "faulted" ? " bad" : "");
     chip.textContent = known ? state.phase : "–";
-    if (!link) blank();
+    if (!link || lost) blank();
     if (ended) put("error", "The panel was stopped.", ended);
+    else if (link && lost) put("error", "No link to the machine.", "Reconnecting. Use the hardware stop if the machine must stop." + (lost.why ? " (" + lost.why + ")" : ""));
     else if (!link) put("error", "No link to the panel.", "Use the hardware stop if the machine must stop.", state ? "" : "connecting");
     else if (left) put("warning", "The controlling page is gone.", "The machine holds" + (left.left > 0 ? ", and ramps down in " + left.left.toFixed(0) + "\u2009s" : " or is at rest") + ". Hold, Ramp down and Request control work from here.");
     else if (age > STALE) put("error", "No data for " + (isFinite(age) ? duration(age / 1000) : "any time") + ".", "Readouts are blank until data arrive.");
@@ -217,7 +220,7 @@
     }
     const down = by("down").querySelector("span"), volts = shown5.volts ? Math.max(...shown5.volts.map(Math.abs)) : NaN;
     const time = facts.ramp && isFinite(volts) ? (volts / facts.ramp).toFixed(1) + "\u2009s to 0\u2009V" : "";
-    down.textContent = !link ? "No link: use the hardware stop" : state && !state.status.amplifiers_on && !left ? "already at rest" : (state && state.phase === "ramping down" ? "ramping down, " : "") + (time ? time + " · " : "") + "key Esc";
+    down.textContent = !link || lost ? "No link: use the hardware stop" : state && !state.status.amplifiers_on && !left ? "already at rest" : (state && state.phase === "ramping down" ? "ramping down, " : "") + (time ? time + " · " : "") + "key Esc";
   }
 
   // The last message of the machine is still current.
@@ -233,6 +236,7 @@
   // ── Controls ──
   let moves = [];
   function controls() {
+    by("banner").hidden = !(state && state.known && (state.known.differ || []).length);
     if (!state || !state.status) return;
     const { status, phase, mine, holder, known } = state, on = status.amplifiers_on, cause = state.said.code;
     const control = mine ? "" : holder ? "in control: " + holder : "request control";
@@ -251,7 +255,7 @@
     [...by("steps").children].forEach((span, k) => { span.className = k === step ? "on" : k < step ? "past" : ""; });
     const held = ["running", "arming", "holding"].includes(phase);
     allow(by("hold"), held ? "" : "not armed", "immediate · key H");
-    allow(by("arm"), phase === "faulted" ? "acknowledge first" : phase !== "disarmed" ? "armed" : control, "press 1\u2009s");
+    allow(by("arm"), phase === "faulted" ? "faulted" : phase !== "disarmed" ? "armed" : control, "press 1\u2009s");
     allow(by("run"), phase === "running" ? "running" : phase !== "holding" && phase !== "arming" ? "not armed" : control, "press 1\u2009s");
     allow(by("acknowledge"), phase !== "faulted" && status.cause !== 16 ? "no fault" : control, "press 1\u2009s");
     for (const [id, next] of [["arm", "disarmed"], ["run", "holding"], ["acknowledge", "faulted"]]) by(id).classList.toggle("next", phase === next && !by(id).disabled);
@@ -263,7 +267,10 @@
     moves.forEach(one => { one.disabled = move !== ""; one.title = move; });
     by("bias").textContent = waving ? "Stop wave" : "Go to bias";
     allow(by("bias"), phase !== "running" ? "not running" : control);
-    if (known.reach) by("reach").innerHTML = "Remaining reach of each axis alone, µm, µrad:<br>" + known.reach.limits.map(([low, high], k) => (k < 3 ? NAMES[k] : "θ<sub>" + NAMES[k][1] + "</sub>") + "\u2009" + number(Number(Math.max(0, Math.min(high - known.reach.from[k], known.reach.from[k] - low)).toPrecision(2)))).join(", ");
+    const away = v => number(Number(Math.max(0, v).toPrecision(2)));
+    if (known.reach) by("reach").innerHTML = known.reach.limits.map(([low, high], k) => "<span>" + (k < 3 ? NAMES[k] : "θ<sub>" + NAMES[k][1] + "</sub>") + " −" + away(known.reach.from[k] - low) + ", +" + away(high - known.reach.from[k]) + "</span>").join("");
+    by("banner").querySelector("span").textContent = (known.differ || []).join(", ") + ". They stay in force after disarming, until the controller restarts.";
+    allow(by("restore"), control);
     // The wave started by the panel, and its remaining time.
     if (!state.wave) wave = wave && wave.trajectory && busy ? wave : null;
     by("wave-name").textContent = chosen ? chosen.name : "";
@@ -314,7 +321,12 @@
   by("down").addEventListener("click", () => urgent("ramp-down"));
   by("hold").addEventListener("click", () => urgent("hold"));
   document.addEventListener("keydown", e => {
-    if (e.key === "Escape") { e.preventDefault(); urgent("ramp-down"); return; }
+    if (e.key === "Escape") {
+      e.preventDefault();
+      urgent("ramp-down");
+      document.querySelectorAll("dialog[open]").forEach(dialog => dialog.close());
+      return;
+    }
     if (e.ctrlKey || e.metaKey || e.altKey || e.repeat) return;
     if (e.key === "h" || e.key === "H") { urgent("hold"); return; }
     const arrow = { ArrowRight: ["x", 1], ArrowLeft: ["x", -1], ArrowUp: ["y", 1], ArrowDown: ["y", -1], PageUp: ["z", 1], PageDown: ["z", -1] }[e.key];
@@ -334,6 +346,8 @@
   by("control").addEventListener("click", () => { if (!state) return; say({ do: state.mine ? (state.asked ? "grant-control" : "offer-control") : "request-control" }); });
   by("keep").addEventListener("click", () => say({ do: "keep-control" }));
   by("bias").addEventListener("click", () => command({ do: "command", line: wave && state.wave ? "wave stop" : "goto zero" }));
+  by("restore").addEventListener("click", () => command({ do: "restore" }));
+  by("csv").addEventListener("click", () => download(facts.name + "-history.csv", samples.csv(strips.span, [...NAMES.map((name, k) => "error of " + name + (k < 3 ? ", m" : ", rad")), ...[0, 1, 2, 3, 4, 5].map(leg => "leg " + leg + ", V")])));
   by("record").addEventListener("click", () => command({ do: "command", line: state.known.recorder.running ? "record stop" : "record arm" }));
   by("download").addEventListener("click", () => command({ do: "download" }));
   const gain = new Gain(by("gain"), facts.gain_margin);

@@ -95,7 +95,7 @@ class Spectrum {
     const most = this.largest(found.y, now);
     if (!this.plot) {
       const unit = this.axis < 3 ? "nm/√Hz" : "nrad/√Hz", top = found.x[found.x.length - 1], seen = this.modes.map((f, k) => [f, k + 1]).filter(([f]) => f < top);
-      this.plot = new Plot(this.figure, { id: "spectrum", title: "error of " + name, label: "Spectrum of the error of " + name, x: { label: "frequency", unit: "Hz", log: true }, y: { label: "error of " + name, unit, log: true }, keys: false, height: Math.max(140, this.figure.clientHeight - 4),
+      this.plot = new Plot(this.figure, { id: "spectrum", title: "error of " + name, label: "Spectrum of the error of " + name, x: { label: "frequency", unit: "Hz", log: true }, y: { label: "error of " + name, unit, log: true }, keys: false, height: Math.max(130, this.figure.clientHeight - 4),
         y_limits: this.limits(most), notes: [{ k: "modes", x: seen.map(([f]) => f), text: seen.map(([, k]) => String(k)) }],
         series: [{ name: "60\u2009s maximum", style: "line", color: 7, x: found.x, y: most }, { name: "live", style: "line", color: 4, x: found.x, y: found.y }] });
     } else {

@@ -1,5 +1,5 @@
 // Data from the link, stored as minimum, mean and maximum per pixel in a fixed amount of memory.
-const SPANS = [5, 30, 300], BINS = 600, CHANNELS = 12;
+const SPANS = [5, 30, 300, 3600], BINS = 600, CHANNELS = 12;
 
 class Ring {
   constructor(seconds, period) {
@@ -94,6 +94,17 @@ class Samples {
   restart() {
     this.rings = SPANS.map(seconds => new Ring(seconds, this.period));
     [this.last, this.gaps, this.marks] = [-1, [], []];
+  }
+
+  // The visible history: for each pixel and channel minimum, mean and maximum.
+  csv(span, names) {
+    const seconds = SPANS[span], rows = new Map();
+    for (let k = 0; k < CHANNELS; k++) this.rings[span].each(k, this.last, seconds, this.period, (tick, ...values) => {
+      if (!rows.has(tick)) rows.set(tick, new Array(3 * CHANNELS).fill(""));
+      values.slice(0, 3).forEach((v, i) => { rows.get(tick)[3 * k + i] = v; });
+    });
+    const head = names.flatMap(name => ["least", "mean", "largest"].map(what => name + ", " + what));
+    return [["time, s", ...head].map(quoted).join(","), ...[...rows].sort((a, b) => a[0] - b[0]).map(([tick, row]) => [(tick * this.period).toFixed(6), ...row].join(","))].join("\n") + "\n";
   }
 
   mark(text, bad) { if (this.last >= 0) { this.marks.push([this.last, text, bad]); if (this.marks.length > 200) this.marks.shift(); } }
@@ -229,12 +240,12 @@ class Strips {
   draw(names, live) {
     const [to, wide, tall] = sized(this.canvas), { samples } = this, ring = samples.rings[this.span], seconds = SPANS[this.span];
     if (wide < 100) return;
-    const unit = this.first ? "nrad" : "nm", left = 40, right = 86, foot = 22, head = 12, height = (tall - foot - head) / 3, inner = wide - left - right;
+    const unit = this.first ? "nrad" : "nm", left = 66, right = 86, foot = 22, head = 12, height = (tall - foot - head) / 3, inner = wide - left - right;
     const stats = [0, 1, 2].map(k => ring.range(this.first + k, samples.last, seconds, samples.period));
     const far = Math.max(...stats.map(s => Math.max(Math.abs(s.low), Math.abs(s.high))).filter(isFinite), 1e-10) * 1e9;
     const wanted = round125(far);
     if (wanted > this.bound || wanted < this.bound / 4) this.bound = wanted;
-    for (const [at, text] of ticks(-seconds, 0, false, 6)) {
+    for (const [at, text] of ticks(-seconds, 0, false, wide < 420 ? 3 : 6)) {
       const x = left + inner * (1 + at / seconds);
       to.strokeStyle = inks.line;
       to.lineWidth = 1;
@@ -351,6 +362,7 @@ function bar(canvas, samples, axis, value) {
   to.lineTo(wide / 2, 19);
   to.stroke();
   if (isFinite(value)) { to.fillStyle = inks.blue; to.fillRect(x(Math.max(-bound, Math.min(bound, value))) - 2, 2, 4, 18); }
+  if (wide < 100) return written(to, "±" + number(bound * 1e9), wide / 2, 31, 12, inks.ink2, "center");
   written(to, number(-bound * 1e9), 2, 31, 12, inks.ink2);
   written(to, "+" + number(bound * 1e9), wide - 2, 31, 12, inks.ink2, "right");
 }

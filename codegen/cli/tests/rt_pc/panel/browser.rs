@@ -1,4 +1,4 @@
-//! The page in headless Chromium, controlled over DevTools: four states with screenshots, and no console messages.
+//! The page in headless Chromium, controlled over DevTools: its states with screenshots at all sizes, axe-core, and no console messages.
 
 use std::fs;
 use std::io::{BufRead, BufReader, Read, Write};
@@ -15,6 +15,29 @@ use crate::support;
 
 /// Variable with a folder for screenshots.
 const PICTURES: &str = "SPECGEN_PICTURES";
+
+/// Sets the size of a window.
+const SIZE: &str = "Emulation.setDeviceMetricsOverride";
+
+/// Faults of the layout, one a line: the page is wider than its window, *Hold* or *Ramp down* is not wholly visible or is covered, parts
+/// of the head overlap, a list or chart has no height.
+const LAYOUT: &str = r"(() => {
+  const by = id => document.getElementById(id), faults = [];
+  const wide = document.documentElement.scrollWidth - innerWidth;
+  if (wide > 0) faults.push(`${wide} px too wide`);
+  for (const id of ['hold', 'down']) {
+    const box = by(id).getBoundingClientRect(), seen = document.elementFromPoint((box.left + box.right) / 2, (box.top + box.bottom) / 2);
+    if (box.left < 0 || box.top < 0 || box.right > innerWidth + 0.5 || box.bottom > innerHeight || !seen || !by(id).contains(seen)) faults.push(`${id} is hidden`);
+  }
+  const parts = [...document.querySelectorAll('#top > *, #fields > *, #fields .line > *')].filter(part => part.offsetParent);
+  parts.forEach((one, k) => parts.slice(k + 1).forEach(other => {
+    if (one.contains(other)) return;
+    const a = one.getBoundingClientRect(), b = other.getBoundingClientRect();
+    if (Math.min(a.right, b.right) - Math.max(a.left, b.left) > 1 && Math.min(a.bottom, b.bottom) - Math.max(a.top, b.top) > 1) faults.push(`${one.textContent} overlaps ${other.textContent}`);
+  }));
+  for (const [id, least] of [['events', 80], ['spectrum', 130], ['legs', 150]]) if (by(id).clientHeight < least) faults.push(`${id} has a height of ${by(id).clientHeight} px`);
+  return faults.join('\n');
+})()";
 
 /// A window.
 struct Window {
@@ -71,7 +94,7 @@ impl Window {
             window.ask(&format!("{domain}.enable"), json!({}));
         }
         let size = json!({ "width": 1440, "height": 900, "deviceScaleFactor": 1, "mobile": false });
-        window.ask("Emulation.setDeviceMetricsOverride", size);
+        window.ask(SIZE, size);
         let theme = if dark { "dark" } else { "light" };
         let features = json!({ "features": [{ "name": "prefers-color-scheme", "value": theme }] });
         window.ask("Emulation.setEmulatedMedia", features);
@@ -147,6 +170,36 @@ impl Window {
         }
     }
 
+    /// Asserts that the layout has no fault at any width and at 200 % zoom, before and after scrolling, and that axe-core finds no
+    /// violation. At 200 %, a window of 1280 px has 640 CSS pixels.
+    fn fits(&mut self, state: &str) {
+        let axe = support::axe();
+        for (width, height, scale) in [
+            (320, 640, 1),
+            (390, 844, 1),
+            (640, 400, 2),
+            (720, 450, 2),
+            (1280, 800, 1),
+            (1440, 900, 1),
+            (2560, 1440, 1),
+        ] {
+            let size = json!({ "width": width, "height": height, "deviceScaleFactor": scale, "mobile": false });
+            self.ask(SIZE, size);
+            // The charts are drawn again.
+            std::thread::sleep(Duration::from_secs(1));
+            let name = format!("{state}-{}-{scale}00", width * scale);
+            assert_eq!(self.value(LAYOUT), "", "{name}");
+            self.picture(&name);
+            assert_eq!(self.value(&format!("scrollTo(0, 1e5), {LAYOUT}")), "", "{name}, scrolled");
+            self.value("scrollTo(0, 0)");
+            if let Some(axe) = &axe {
+                let found = self.value(&format!("{axe}; {}", support::VIOLATIONS));
+                assert_eq!(found, "", "{name}");
+            }
+        }
+        self.ask(SIZE, json!({ "width": 1440, "height": 900, "deviceScaleFactor": 1, "mobile": false }));
+    }
+
     /// Asserts that there were no errors in the page.
     fn sound(mut self) {
         assert_eq!(self.value("document.documentElement.dataset.errors"), "0", "the page's own count of errors");
@@ -190,6 +243,9 @@ pub fn a_browser_draws_it(panel: &Panel) {
     page.picture("faulted-dark");
     page.press("acknowledge");
     page.wait(&chip("disarmed"));
+    page.fits("disarmed");
+    // While disarmed there is no error, in the table and in the strips.
+    page.wait("[...document.querySelectorAll('#readout .error span')].every(cell => cell.textContent === '–')");
     page.press("arm");
     page.wait(&chip("holding"));
     page.press("run");
@@ -201,6 +257,7 @@ pub fn a_browser_draws_it(panel: &Panel) {
     page.wait("/\\d/.test(document.querySelector('#readout .pose').textContent)");
     page.wait("document.querySelector('#spectrum svg') !== null");
     page.picture("running-dark");
+    page.fits("running");
     let drawn = "(id => { const c = document.getElementById(id), d = c.getContext('2d').getImageData(0, 0, c.width, c.height).data; return new Set(new Uint32Array(d.buffer)).size; })";
     for canvas in ["strips", "legs"] {
         let colors = page.value(&format!("{drawn}('{canvas}')"));
@@ -225,8 +282,17 @@ pub fn a_browser_draws_it(panel: &Panel) {
             ["shownMean", "shownMost"].map(|key| window.value(&format!("document.documentElement.dataset.{key}")));
         println!("from the panel to the screen: {mean} ms in the mean, {most} ms at most");
     }
-    // Esc ramps down from the watching page.
+    // Hold and Ramp down have the keyboard focus like any button; Esc ramps down from the watching page, and closes a dialog.
+    for id in ["hold", "down"] {
+        let focus = format!(
+            "(b => (b.focus(), document.activeElement === b && b.tabIndex === 0))(document.getElementById('{id}'))"
+        );
+        assert_eq!(page.value(&focus), true, "{id}");
+    }
+    page.click("check");
+    assert_eq!(page.value("document.querySelectorAll('dialog[open]').length"), 1);
     page.value("document.dispatchEvent(new KeyboardEvent('keydown', { key: 'Escape', bubbles: true }))");
+    assert_eq!(page.value("document.querySelectorAll('dialog[open]').length"), 0);
     page.wait(&chip("disarmed"));
     page.sound();
     other.sound();
