@@ -451,8 +451,8 @@ fn forces_that_give_no_stiffness_are_refused_with_the_time() {
         "E0645",
         "at 12 s the drive is 51 V",
     );
-    expect(&with(&|r| r[2] *= 1e-6), "E0646", "none of a piezo actuator");
-    expect(&with(&|r| r[1] *= 1e6), "E0646", "none of a piezo actuator");
+    expect(&with(&|r| r[2] *= 1e-6), "E0646", "not that of a piezo actuator");
+    expect(&with(&|r| r[1] *= 1e6), "E0646", "not that of a piezo actuator");
     expect(&with(&|r| r[2] = r[2].min(7.0)), "E0513", "`displacement_um` is limited at 7");
     expect(&with(&|r| r[1] = 5.0), "E0512", "`force_N` is 5 in every sample, from 0 s to 39.99 s");
 }

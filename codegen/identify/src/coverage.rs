@@ -9,7 +9,6 @@ use super::findings::Findings;
 use super::record::Record;
 use super::regressor::Plane;
 use super::sanity::{self, PLAUSIBLE_RANGE};
-use super::selection;
 use super::statistics::{extent, micrometres};
 use crate::everett::EverettTable;
 use specgen_language::diagnostic::codes;
@@ -41,8 +40,8 @@ pub(crate) fn plane(options: &Options, findings: &mut Findings) -> Option<Plane>
     if findings.any_error() { None } else { Some(Plane { grid: options.grid, range: [low, high] }) }
 }
 
-/// Compares the drive of the record with the declared range.
-pub(crate) fn check_range(record: &Record, plane: &Plane, findings: &mut Findings) {
+/// Compares the drive of the record with the declared range. `loops`: it grows or decays, and hardly ever returns.
+pub(crate) fn check_range(record: &Record, plane: &Plane, loops: bool, findings: &mut Findings) {
     let [low, high] = plane.range;
     let span = high - low;
     let (bottom, top) = extent(&record.drive);
@@ -74,7 +73,6 @@ pub(crate) fn check_range(record: &Record, plane: &Plane, findings: &mut Finding
     }
     let interval = plane.interval();
     // Growing or decaying loops: a smooth table goes on a little beyond them.
-    let loops = selection::hardly_returns(record, plane);
     if loops && bottom <= low + SMOOTH_END * span && top >= high - SMOOTH_END * span {
         if bottom > low + interval || top < high - interval {
             let message = format!("{found}: the cells beyond were never excited, and continue those before them");

@@ -3,7 +3,6 @@
 use std::path::Path;
 
 use crate::everett::EverettTable;
-use crate::findings::Findings;
 use crate::leg_model::{Around, Family, FamilyScore, LegModel, choose};
 use crate::mode::Mode;
 use crate::rate::period::{INVERTED, Invertible};

@@ -76,7 +76,7 @@ pub fn choose_grid(record: &Record, drive: [f64; 2], dead_time: DeadTime) -> Res
 
 fn choose(record: &Record, drive: [f64; 2], dead_time: DeadTime, findings: &mut Findings) -> Option<GridChoice> {
     let probe = coverage::plane(&Options::new(PROBE, drive), findings)?;
-    coverage::check_range(record, &probe, findings);
+    coverage::check_range(record, &probe, selection::hardly_returns(record, &probe), findings);
     if findings.any_error() {
         return None;
     }

@@ -42,6 +42,7 @@ mod least_squares;
 pub mod leg_model;
 mod limits;
 pub mod linear;
+mod mixed;
 pub mod mode;
 mod normal;
 mod prior;
@@ -151,7 +152,7 @@ fn identify_checked(
     findings: &mut Findings,
 ) -> Option<(EverettTable, Report, Trace)> {
     let plane = coverage::plane(options, findings)?;
-    coverage::check_range(record, &plane, findings);
+    coverage::check_range(record, &plane, selection::hardly_returns(record, &plane), findings);
     if findings.any_error() {
         return None;
     }

@@ -18,7 +18,6 @@ mod export;
 mod fit;
 pub(crate) mod forward;
 mod joint;
-pub(crate) mod mixed;
 mod open_weight;
 pub mod period;
 pub(crate) mod predict;
@@ -34,7 +33,7 @@ use specgen_language::diagnostic::Diagnostic;
 use super::findings::Findings;
 use super::mode::{self, Mode, Ring};
 use super::record::Record;
-use super::{Options, coverage, defects, sweep};
+use super::{Options, coverage, defects, selection, sweep};
 
 pub use export::{read_rate_csv, spec_lines, write_rate_csv};
 pub use report::{HoldOut, OptionReport, RateRecord, RateReport, Verdict};
@@ -176,7 +175,7 @@ pub fn identify_rate(
         let mut findings = Findings::new(&record.shown_as);
         plane = coverage::plane(options, &mut findings);
         if let Some(plane) = &plane {
-            coverage::check_range(record, plane, &mut findings);
+            coverage::check_range(record, plane, selection::hardly_returns(record, plane), &mut findings);
         }
         if let Some(plane) = plane.filter(|_| !findings.any_error()) {
             mended.push(defects::repaired(record, plane.range, plane.grid, &mut findings));

@@ -68,15 +68,13 @@ fn leave(end: &impl Fn() -> u8) -> ! {
     let _whole = whole();
     let passing = locked(&PASSING);
     for one in passing.iter().rev() {
-        // A compiler that was interrupted as well may still be writing its last file.
-        let grows = |error: &io::Error| {
-            error.kind() == io::ErrorKind::DirectoryNotEmpty && matches!(one, TemporaryPath::Tree(_))
-        };
-        for _ in 0..20 {
-            match one.remove() {
-                Err(error) if grows(&error) => std::thread::sleep(Duration::from_millis(20)),
-                _ => break,
+        // A compiler that was interrupted as well may still be writing or removing its last files.
+        let changes = || matches!(one, TemporaryPath::Tree(path) if path.exists());
+        for _ in 0..100 {
+            if one.remove().is_ok() || !changes() {
+                break;
             }
+            std::thread::sleep(Duration::from_millis(20));
         }
     }
     std::process::exit(i32::from(end()));

@@ -32,7 +32,7 @@ pub fn square(a: Complex) -> f64 {
     a[0] * a[0] + a[1] * a[1]
 }
 
-/// |S|² at each frequency, S = 1/(1 + P C), to `seen`; whether the closed loop is stable by Nyquist's criterion.
+/// |S|² at each frequency, S = 1/(1 + P C), to `seen` as numerator and denominator; whether the closed loop is stable by Nyquist's criterion.
 ///
 /// The responses are those of plant and controller at rising frequencies from near 0 to half the sampling rate, so
 /// close together that the phase changes by less than half a turn between neighbours. P is stable; C is stable apart
@@ -43,13 +43,13 @@ pub fn sensitivity(
     plant: &[Complex],
     controller: &[Complex],
     cancelled: &[Complex],
-    mut seen: impl FnMut(usize, f64),
+    mut seen: impl FnMut(usize, [f64; 2]),
 ) -> bool {
     let mut last = [1.0, 0.0];
     let mut turns = 0;
     for (k, ((p, c), one)) in plant.iter().zip(controller).zip(cancelled).enumerate() {
         let value = plus(*one, times(*p, *c));
-        seen(k, square(*one) / square(value));
+        seen(k, [square(*one), square(value)]);
         if (last[1] < 0.0) != (value[1] < 0.0) {
             // The intersection of the step with the real axis.
             let crossing = last[0] * value[1] - value[0] * last[1];
@@ -139,6 +139,34 @@ impl Flexure {
         far_enough && imaginary * imaginary * (1.0 + Self::SLACK) >= smallest
     }
 
+    /// Whether [`Flexure::may_exceed`] may hold for any δ with |δ| = `distance` < 1: L' and T' are then on a circle. False only where it
+    /// certainly holds for none of them.
+    #[inline]
+    #[must_use]
+    pub fn may_exceed_about(self, loop_gain: Complex, distance: f64, least: [f64; 2]) -> bool {
+        // −L' or a T' on the circle.
+        let (from_one, norm, share) = match self {
+            Self::Series => ([1.0, 0.0], 1.0 - distance * distance, -1.0),
+            Self::Sensor(share) => {
+                let from_one = [1.0 + loop_gain[0], loop_gain[1]];
+                (from_one, square(from_one) - distance * distance, share)
+            }
+        };
+        // Otherwise δ passes about the pole.
+        if norm <= Self::SLACK {
+            return true;
+        }
+        let [re, im] = over(loop_gain, from_one).map(|part| share * part * (square(from_one) / norm));
+        let radius = share.abs() * distance * libm::sqrt(square(loop_gain)) / norm * (1.0 + Self::SLACK) + Self::SLACK;
+        let [smallest, largest] = [1.0 - re - radius, 1.0 - re + radius];
+        let (far_enough, imaginary) = match self {
+            Self::Series => (smallest * least[0] * least[0] <= 1.0, im + radius),
+            Self::Sensor(_) => (largest >= least[0] * least[0], radius - im),
+        };
+        let smallest = if smallest > 0.0 { smallest } else { 0.0 };
+        far_enough && imaginary > 0.0 && imaginary * imaginary >= 4.0 * least[1] * least[1] * smallest
+    }
+
     /// Relative, far above the rounding errors of [`Flexure::border`].
     const SLACK: f64 = 1e-9;
 }
@@ -148,11 +176,14 @@ impl Flexure {
 pub struct FlexureRange {
     /// Lowest f_n, in the unit of the loop's frequencies.
     pub from: f64,
+    /// Highest f_n; infinite if not given.
+    pub to: f64,
     /// Least ζ.
     pub damping_ratio: f64,
     /// Where a mode may act.
     pub flexures: Vec<Flexure>,
-    /// Points on the circle of the least |1 + L·factor|.
+    /// Least |1 + L·factor|, and points on its circle.
+    distance: f64,
     distances: Vec<Complex>,
 }
 
@@ -170,24 +201,31 @@ impl FlexureRange {
             [distance * cos, distance * sin]
         };
         let points = if distance > 0.0 { Self::POINTS } else { 1 };
-        Self { from, damping_ratio, flexures, distances: (0..points).map(point).collect() }
+        let distances = (0..points).map(point).collect();
+        Self { from, to: f64::INFINITY, damping_ratio, flexures, distance, distances }
     }
 
     /// How far a mode within the range would have to change until |1 + L·factor| is no longer below the distance at this frequency:
     /// zero if no mode does that, else the smaller of ln(ζ/ζ of the range) and a multiple of ln(f_n/from), as a penalty. `depth` becomes
     /// this if it is larger.
     fn deepen(&self, loop_gain: Complex, frequency: f64, depth: &mut Depth) {
+        let relative = self.from / frequency;
+        let least = |depth: &Depth| [relative * depth.factors[0], self.damping_ratio * depth.factors[1]];
         for flexure in &self.flexures {
+            if self.distance > 0.0 && !flexure.may_exceed_about(loop_gain, self.distance, least(depth)) {
+                continue;
+            }
             for distance in &self.distances {
-                let least = [self.from / frequency * depth.factors[0], self.damping_ratio * depth.factors[1]];
-                if !flexure.may_exceed(loop_gain, *distance, least) {
+                if !flexure.may_exceed(loop_gain, *distance, least(depth)) {
                     continue;
                 }
                 let Some([ratio, damping]) = flexure.border(loop_gain, *distance) else { continue };
-                if ratio * frequency <= self.from || damping <= self.damping_ratio {
+                if ratio * frequency <= self.from || ratio * frequency >= self.to || damping <= self.damping_ratio {
                     continue;
                 }
                 let above = Self::STEEP * libm::log(ratio * frequency / self.from);
+                let below = Self::STEEP * libm::log(self.to / (ratio * frequency));
+                let above = if below < above { below } else { above };
                 let damped = libm::log(damping / self.damping_ratio);
                 let found = if above < damped { above } else { damped };
                 if found > depth.most {
@@ -216,27 +254,30 @@ pub struct Tolerance {
     pub depth: f64,
 }
 
-/// Stability and largest |S| of a loop, as in [`sensitivity`], and the largest depth of its border over `frequencies`.
+/// Stability and largest |S| of a loop, as in [`sensitivity`], and the largest depth of its border over `frequencies`; `gain` is
+/// `controller` over `cancelled`.
 #[must_use]
 pub fn tolerance(
     plant: &[Complex],
     controller: &[Complex],
     cancelled: &[Complex],
+    gain: &[Complex],
     frequencies: &[f64],
     range: Option<&FlexureRange>,
 ) -> Tolerance {
-    let (mut most, mut depth) = (0.0, Depth { most: 0.0, factors: [1.0; 2] });
+    // The largest |S|² as numerator and denominator, which saves a division at each frequency.
+    let (mut most, mut depth) = ([0.0, 1.0], Depth { most: 0.0, factors: [1.0; 2] });
     let stable = sensitivity(plant, controller, cancelled, |k, s| {
-        if s > most {
+        if s[0] * most[1] > most[0] * s[1] {
             most = s;
         }
         let Some(range) = range else { return };
         // Below a quarter of the lowest mode |L| would have to be within a sixteenth of 1.
         if frequencies[k] > 0.25 * range.from {
-            range.deepen(over(times(plant[k], controller[k]), cancelled[k]), frequencies[k], &mut depth);
+            range.deepen(times(plant[k], gain[k]), frequencies[k], &mut depth);
         }
     });
-    Tolerance { stable, sensitivity: libm::sqrt(most), depth: depth.most }
+    Tolerance { stable, sensitivity: libm::sqrt(most[0] / most[1]), depth: depth.most }
 }
 
 #[cfg(test)]
@@ -291,6 +332,33 @@ mod tests {
         assert!(exceeding > 30_000 && settled > 100_000, "{exceeding} {settled}");
     }
 
+    /// The circle settles nothing that one of its points does not.
+    #[test]
+    fn a_distance_of_a_circle_is_never_passed_over() {
+        let (mut exceeding, mut settled) = (0, 0);
+        for flexure in [Flexure::Series, Flexure::Sensor(0.5), Flexure::Sensor(-0.1), Flexure::Sensor(3.0)] {
+            for k in 0..4000_u32 {
+                let (size, angle) = (libm::exp(0.02 * f64::from(k % 400) - 6.0), 0.7 * f64::from(k));
+                let loop_gain = [size * libm::cos(angle), size * libm::sin(angle)];
+                for radius in [0.1, 0.4] {
+                    for least in [[0.0, 0.0], [0.8, 0.01], [1.2, 0.01], [0.9, 0.1]] {
+                        let may = flexure.may_exceed_about(loop_gain, radius, least);
+                        let exceeds = (0..24).any(|point| {
+                            let angle = core::f64::consts::TAU * f64::from(point) / 24.0;
+                            let distance = [radius * libm::cos(angle), radius * libm::sin(angle)];
+                            let border = flexure.border(loop_gain, distance);
+                            border.is_some_and(|[ratio, damping]| ratio > least[0] && damping > least[1])
+                        });
+                        exceeding += u32::from(exceeds);
+                        assert!(may || !exceeds, "{flexure:?} {loop_gain:?} {radius} {least:?}");
+                        settled += u32::from(!may);
+                    }
+                }
+            }
+        }
+        assert!(exceeding > 20_000 && settled > 30_000, "{exceeding} {settled}");
+    }
+
     /// L = k z⁻¹/(1 − p z⁻¹) is stable for −(1 + p) < −k < 1 − p … |p − k| < 1; an integrator for 0 < k < 2.
     #[test]
     fn a_loop_is_stable_where_its_pole_is_within_the_unit_circle() {
@@ -307,9 +375,9 @@ mod tests {
                     .collect();
                 let controller = vec![[gain, 0.0]; delay.len()];
                 let mut largest = 0.0;
-                let stable = sensitivity(&plant, &controller, &cancelled, |_, s| {
-                    if s > largest {
-                        largest = s;
+                let stable = sensitivity(&plant, &controller, &cancelled, |_, [above, below]| {
+                    if above / below > largest {
+                        largest = above / below;
                     }
                 });
                 assert_eq!(stable, (pole - gain).abs() < 1.0, "pole {pole}, gain {gain}");

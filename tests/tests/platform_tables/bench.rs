@@ -20,9 +20,6 @@ pub const BIAS: [f64; 6] = [0.0, 0.0, 10e-6, 0.0, 0.0, 0.0];
 /// Seed of gauge and amplifier noise.
 pub const SEED: u64 = 1;
 
-/// Edit of the reference spec: with active damping of the modes.
-pub const DAMPED: (&str, &str) = ("notch_damping   = 1.0", "notch_damping   = 1.0\nactive_damping  = true");
-
 /// A machine with its controller.
 pub struct Bench {
     pub specimen: Specimen,

@@ -6,9 +6,9 @@ use std::f64::consts::TAU;
 use host_sim::plant::LegParameters;
 use host_sim::platform::{PlatformParameters, Specimen};
 use host_sim::trajectory::{PaperPath, PaperPose, PoseTarget, PoseTrajectory};
-use specgen_tests::{length, skipped};
+use specgen_tests::{damped, length, skipped};
 
-use super::bench::{Bench, DAMPED, records, reference_machine};
+use super::bench::{Bench, records, reference_machine};
 
 /// A circle in x and y that grows from its middle and shrinks to it again, each within `RAMP`.
 pub struct Circle {
@@ -105,7 +105,7 @@ fn a_finer_grid_is_no_worse() {
             let cells = format!("grid    = {grid}");
             let edits = [
                 ("grid    = 32", cells.as_str()),
-                DAMPED,
+                damped(),
                 ("flash        = \"128 KiB\"", "flash        = \"256 KiB\""),
             ];
             let bench = Bench::with_records(

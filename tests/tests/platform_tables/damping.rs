@@ -9,16 +9,16 @@ use host_sim::trajectory::{PaperPath, PaperPose, PoseTarget};
 use specgen::stability::platform::{ClosedLoop, Conditions, Tuning};
 use specgen::tuning::relay;
 use specgen_runtime::{ControlMode, Law};
-use specgen_tests::length;
+use specgen_tests::{damped, length};
 
-use super::bench::{Bench, DAMPED, PERIOD, in_parallel, reference_machine};
+use super::bench::{Bench, PERIOD, in_parallel, reference_machine};
 use super::classes::{bouc_wen, errors};
 use super::limits::closed_loop;
 
 /// The reference machine, damped.
 fn damped_machine() -> &'static Bench {
     static BENCH: OnceLock<Bench> = OnceLock::new();
-    BENCH.get_or_init(|| Bench::new("damping-plays", Specimen::reference(), &[DAMPED]))
+    BENCH.get_or_init(|| Bench::new("damping-plays", Specimen::reference(), &[damped()]))
 }
 
 #[test]
@@ -45,7 +45,7 @@ fn every_mode_is_damped_within_the_bounds_of_the_design() {
     }
     // And the machine does as the model says.
     let [ring, ..] = disturbed(bench);
-    assert!(ring <= 15.0, "{ring} ms to 10 nm after a step of 1 N");
+    assert!(ring <= 12.0, "{ring} ms to 10 nm after a step of 1 N");
 }
 
 /// Time after a force of 1 N along x has gone until the true pose stays within 10 nm of the set-point, ms; and rms of its distance
@@ -95,12 +95,12 @@ fn damped_machines_follow_and_hold_better_than_undamped_ones() {
     let other = || {
         static BENCHES: OnceLock<[Bench; 2]> = OnceLock::new();
         let [without, damped] =
-            BENCHES.get_or_init(|| [bouc_wen("classes-bouc-wen", &[]), bouc_wen("damping-bouc-wen", &[DAMPED])]);
+            BENCHES.get_or_init(|| [bouc_wen("classes-bouc-wen", &[]), bouc_wen("damping-bouc-wen", &[damped()])]);
         [without, damped]
     };
     type Benches<'a> = &'a dyn Fn() -> [&'static Bench; 2];
     let cases: [(&str, Benches<'_>, f64); 2] =
-        [("plays", &|| [reference_machine(), damped_machine()], 21.0), ("Bouc-Wen", &other, 66.0)];
+        [("plays", &|| [reference_machine(), damped_machine()], 20.0), ("Bouc-Wen", &other, 66.0)];
     for (name, benches, bar) in &cases {
         let benches = benches();
         let found = in_parallel(2, |which| (errors(benches[which as usize]), disturbed(benches[which as usize])));
@@ -112,7 +112,7 @@ fn damped_machines_follow_and_hold_better_than_undamped_ones() {
         }
         let [(before, [ring, place, turn]), (after, [rung, placed, turned])] = found[..] else { unreachable!() };
         assert!(after[0] <= *bar && after[0] < before[0], "{after:?}");
-        assert!(rung <= 15.0 && rung < ring && placed <= place && turned <= turn, "{found:?}");
+        assert!(rung <= 12.0 && rung < ring && placed <= place && turned <= turn, "{found:?}");
     }
 }
 
@@ -124,7 +124,7 @@ fn without_estimates_feed_forward_halves_the_error_of_p_on_glass() {
     let mut benches = vec![("plays", reference_machine()), ("plays, damped", damped_machine())];
     if length(false, true) {
         benches.push(("Bouc-Wen", other[0].get_or_init(|| bouc_wen("glass-bouc-wen", &[]))));
-        benches.push(("Bouc-Wen, damped", other[1].get_or_init(|| bouc_wen("glass-damped-bouc-wen", &[DAMPED]))));
+        benches.push(("Bouc-Wen, damped", other[1].get_or_init(|| bouc_wen("glass-damped-bouc-wen", &[damped()]))));
     }
     let path = PaperPose::corrected(PaperPath::Machining, 1.0);
     let modes = [ControlMode::WORDS[0], ControlMode::WORDS[4]];
@@ -163,16 +163,16 @@ fn the_relay_test_of_tune_finds_the_limit_of_the_damped_loop() {
         let closed_loop = [&damped, &bare][which as usize];
         relay::test(&bench.scenario(), &bench.controller(), closed_loop, [0.1, lead]).unwrap()
     });
-    for axis in 0..2 {
+    for axis in 0..6 {
         let [damped, bare] = [(0, &damped), (1, &bare)].map(|(which, closed_loop): (usize, _)| {
             let found = found[which][axis].unwrap();
             (found.gain, 1.0 / found.period, limit(closed_loop, axis))
         });
         println!("axis {axis}: gain, Hz, gain by eigenvalues: damped {damped:.2?}, without {bare:.2?}");
         for (gain, _, expected) in [damped, bare] {
-            assert!(gain / expected > 0.75 && gain / expected < 1.25, "{gain} {expected}");
+            assert!(gain / expected > 0.8 && gain / expected < 1.2, "{gain} {expected}");
         }
-        // So the two are told apart.
-        assert!(damped.1 / bare.1 > 1.03 && damped.2 / bare.2 > 1.03);
+        // Active damping is in the loop.
+        assert!((damped.0 / bare.0 - 1.0).abs() > 0.01);
     }
 }

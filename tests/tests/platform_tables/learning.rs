@@ -18,18 +18,22 @@ use specgen::robust::{Deviation, Factors};
 use specgen::stability::platform::{Conditions, Tuning};
 use specgen_runtime::playback::Knot;
 use specgen_runtime::{ControlMode, Law};
-use specgen_tests::length;
+use specgen_tests::{damped, length};
 
 use super::bench::{Bench, PERIOD, in_parallel, scenario};
 use super::classes::{Circle, bouc_wen};
 use super::limits::closed_loop;
 
 /// With streams fast enough for a circle of 5 µm at 200 Hz.
-const LEARNING: [(&str, &str); 3] = [
-    ("notch_damping   = 1.0", "notch_damping   = 1.0\nactive_damping  = true\ncorrection = \"6 um\""),
-    ("stream_speed = [\"5 mm/s\", \"5 mm/s\", \"5 mm/s\"", "stream_speed = [\"8 mm/s\", \"8 mm/s\", \"8 mm/s\""),
-    ("stale_ticks  = 10", "stale_ticks = 3"),
-];
+fn learning() -> [(&'static str, &'static str); 4] {
+    [
+        damped(),
+        ("notch_damping   = 1.0", "notch_damping   = 1.0\ncorrection = \"6 um\""),
+        ("stream_speed = [\"5 mm/s\", \"5 mm/s\", \"5 mm/s\"", "stream_speed = [\"8 mm/s\", \"8 mm/s\", \"8 mm/s\""),
+        ("stale_ticks  = 10", "stale_ticks = 3"),
+    ]
+}
+
 /// Of the platform's joints, m.
 pub const RADIUS: f64 = 0.1;
 /// Back to the start, m/s and rad/s.
@@ -39,12 +43,12 @@ pub const WISH: f64 = 800.0;
 
 pub fn plays() -> &'static Bench {
     static BENCH: OnceLock<Bench> = OnceLock::new();
-    BENCH.get_or_init(|| Bench::new("learning-plays", Specimen::reference(), &LEARNING))
+    BENCH.get_or_init(|| Bench::new("learning-plays", Specimen::reference(), &learning()))
 }
 
 pub fn other() -> &'static Bench {
     static BENCH: OnceLock<Bench> = OnceLock::new();
-    BENCH.get_or_init(|| bouc_wen("learning-bouc-wen", &LEARNING))
+    BENCH.get_or_init(|| bouc_wen("learning-bouc-wen", &learning()))
 }
 
 /// Plays that widen with the rate of the voltage, in the legs and in the records of the controller.
@@ -53,7 +57,7 @@ fn widening() -> &'static Bench {
     BENCH.get_or_init(|| {
         let mut specimen = Specimen::reference();
         specimen.legs.iter_mut().for_each(|leg| leg.kappa = 0.02);
-        Bench::new("learning-widening", specimen, &LEARNING)
+        Bench::new("learning-widening", specimen, &learning())
     })
 }
 
@@ -241,10 +245,8 @@ const STEPS: [[f64; 2]; 2] = [[1e-6, 2e-3], [10e-6, 5e-3]];
 /// Where what the integral gathered on the way is handed over at its end.
 fn stepping(class: usize) -> &'static Bench {
     static BENCHES: [OnceLock<Bench>; 2] = [const { OnceLock::new() }; 2];
-    let [mut edits, rest @ ..] = LEARNING.map(|(old, new)| (old, new.to_owned()));
-    edits.1 += "\nhand_over       = true";
-    let edits = [&[edits], &rest[..]].concat();
-    let edits: Vec<(&str, &str)> = edits.iter().map(|(old, new)| (*old, new.as_str())).collect();
+    let hand_over = ("notch_damping   = 1.0", "notch_damping   = 1.0\nhand_over       = true");
+    let edits = [&learning()[..], &[hand_over]].concat();
     BENCHES[class].get_or_init(|| match class {
         0 => Bench::new("stepping-plays", Specimen::reference(), &edits),
         _ => bouc_wen("stepping-bouc-wen", &edits),

@@ -7,9 +7,9 @@ use host_sim::platform::{PlatformParameters, Specimen};
 use host_sim::trajectory::{PoseTarget, PoseTrajectory};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
-use specgen_tests::{length, skipped};
+use specgen_tests::{damped, length, skipped};
 
-use super::bench::{Bench, DAMPED};
+use super::bench::Bench;
 
 /// One sine of an axis: axis, amplitude (m), angular frequency (rad/s), phase.
 type Line = (usize, f64, f64, f64);
@@ -97,7 +97,7 @@ fn errors(bench: &Bench) -> [f64; 3] {
 fn bench(name: &str, leg: &LegParameters, model: &str) -> Bench {
     let legs = Specimen::within_tolerances(&PlatformParameters::reference(), leg, 1);
     let model = format!("memory  = 64\nmodel   = \"{model}\"");
-    Bench::new(&format!("non-repeating-{name}"), legs, &[("memory  = 64", &model), DAMPED])
+    Bench::new(&format!("non-repeating-{name}"), legs, &[("memory  = 64", &model), damped()])
 }
 
 fn shown(what: &str, errors: [f64; 3]) -> [f64; 3] {

@@ -5,7 +5,7 @@ use specgen_language::interrupt;
 use specgen_numerics::simplex;
 
 use super::family::{Family, TIMES};
-use crate::rate::mixed;
+use crate::mixed;
 use crate::staircase::saturate;
 use crate::statistics::mean;
 

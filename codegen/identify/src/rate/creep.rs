@@ -12,8 +12,9 @@ use nalgebra::DMatrix;
 use super::forward::{nonzero_terms, parts};
 use super::prepare::PreparedRecord;
 use super::table::Tables;
-use super::{CreepTerm, RateModel, mixed};
+use super::{CreepTerm, RateModel};
 use crate::least_squares::dot;
+use crate::mixed;
 use crate::statistics::{Line, rates};
 use specgen_numerics::nnls::Failure;
 

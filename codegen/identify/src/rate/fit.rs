@@ -3,9 +3,10 @@
 use super::joint::Shape;
 use super::prepare::PreparedRecord;
 use super::table::{Tables, accumulate};
-use super::{RateModel, creep, joint, mixed, table};
+use super::{RateModel, creep, joint, table};
 use crate::findings::Findings;
 use crate::least_squares::dot;
+use crate::mixed;
 use crate::mode::Mode;
 use crate::regressor::Plane;
 use crate::{dead_time, normal, prior};

@@ -11,8 +11,9 @@ use super::forward::{self, nonzero_terms};
 use super::prepare::PreparedRecord;
 use super::start::RecordColumns;
 use super::table::Tables;
-use super::{CreepTerm, Inertia, RateModel, creep, mixed};
+use super::{CreepTerm, Inertia, RateModel, creep};
 use crate::least_squares::dot;
+use crate::mixed;
 use crate::mode::Mode;
 use specgen_numerics::nnls::Failure;
 

@@ -243,7 +243,7 @@ section! {
         /// For each mode of the platform, from the lowest: the section of its active damping, b0, b1, b2, a1, a2 of (b0 + b1/z + b2/z²) / (1 + a1/z + a2/z²).
         sections: [[f64; 5]; 6] = Shape::Rows(6, &[COEFFICIENT; 5]), Required, "", SECTIONS_OF_MODES;
         /// Damping ratio that the notch gives to each mode.
-        notch_damping: [f64; 6] = list(&[Item::Number(Range::above(0.0, 1.0)); 6]), Required, "", [0.5, 0.5, 0.4, 0.4, 0.3, 0.3];
+        notch_damping: [f64; 6] = list(&[Item::Number(Range::above(0.0, 2.0)); 6]), Required, "", [0.5, 0.5, 0.4, 0.4, 0.3, 0.3];
         /// Proportional gain.
         proportional: [f64; 6] = list(STIFFNESSES), Required, "k_p", ["5e6 N/m", "5e6 N/m", "2e7 N/m", "1e5 N m/rad", "1e5 N m/rad", "5e4 N m/rad"];
         /// Integral gain.

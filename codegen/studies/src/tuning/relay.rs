@@ -4,8 +4,11 @@
 //! One axis at a time, at the bias pose. The relay replaces k_p: it follows the modal notch, and its force ± d requests the motion K⁻¹ d
 //! from the legs. Active damping, which uses the raw error, is on. The emitted controller turns that motion into voltages in mode F with only
 //! the inverse model, so the hysteresis is compensated as in operation; its lead, which applies to set-points and not to feedback, is undone. On
-//! the bare loop the test finds the first resonance; with the notch it finds the phase lag of amplifier, notch and tick.
-//! finds where the lag of amplifier, notch and tick turn the phase.
+//! the bare loop the test finds the first resonance; with the notch it finds where the lags of amplifier, notch and tick turn the phase.
+//!
+//! A relay that switches at ticks may lock to a period of a few whole ticks, at more than twice the gain of the limit. So it is followed by
+//! amplifiers that saturate at ± d (saturation relay, Yu 1999), each with a lower gain than that found last, until none oscillates: an
+//! oscillation needs no more gain than its amplifier has.
 
 use core::f64::consts::PI;
 
@@ -28,6 +31,13 @@ const SETTLED: usize = 20;
 const MEASURED: usize = 40;
 /// Number of ticks after which a relay without oscillation is given up.
 const MOST_TICKS: usize = 20_000;
+/// Gain of an amplifier, relative to the gain found last.
+const LOWER: f64 = 0.8;
+/// An amplifier whose output stays below this for so many ticks does not oscillate.
+const SATURATED: f64 = 0.9;
+const QUIET_TICKS: usize = 1000;
+/// One that hardly saturates dies away slowly: gain found, relative to that of the amplifier.
+const DYING: f64 = 0.98;
 
 /// Relay test result of an axis.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -99,13 +109,20 @@ fn one_axis(
     let center = bench.rig().plant().pose();
     let mut relay = Relay::default();
     let mut asked = [0.0; 6];
+    let mut lowest = None;
     for tick in 0..MOST_TICKS {
         let pose = bench.rig().plant().pose();
         let error: [f64; 6] = std::array::from_fn(|k| center[k] - pose[k]);
         let output = relay.switch(tick, notch.filter(&error)[axis] / amplitude);
         let damped = damping.as_mut().map_or([0.0; 6], |damping| damping.filter(&error));
         if let Some((gain, period)) = relay.found {
-            return Ok(Some(Ultimate { gain, period: period * options.interval }));
+            if relay.gain.is_some_and(|own| gain > DYING * own) {
+                break;
+            }
+            lowest = Some(Ultimate { gain, period: period * options.interval });
+            relay = Relay::saturating(LOWER * gain);
+        } else if relay.quiet > QUIET_TICKS {
+            break;
         }
         // The controller requests r + lead (r − r_last), so choose r to give what relay and damping request.
         for (k, asked) in asked.iter_mut().enumerate() {
@@ -113,26 +130,39 @@ fn one_axis(
         }
         bench.tick(&Request::stream(PoseTarget { pose: asked, ..PoseTarget::default() }))?;
     }
-    Ok(None)
+    Ok(lowest)
 }
 
-/// Switches on the sign of its input and measures the oscillation.
+/// Switches on the sign of its input, or amplifies it up to ± 1, and measures the oscillation.
 #[derive(Debug, Clone, Default)]
 struct Relay {
+    /// Gain of the amplifier; `None` for a relay.
+    gain: Option<f64>,
+    /// Ticks since the output was last near ± 1.
+    quiet: usize,
     high: bool,
     last: f64,
     /// Times of upward switches, ticks, interpolated linearly between samples.
     rises: Vec<f64>,
-    /// The input itself: sums with cosine and sine are not possible before the period is known.
-    inputs: Vec<(f64, f64)>,
+    /// Time, input and output: sums with cosine and sine are not possible before the period is known.
+    samples: Vec<(f64, [f64; 2])>,
     found: Option<(f64, f64)>,
 }
 
 impl Relay {
+    fn saturating(gain: f64) -> Self {
+        Self { gain: Some(gain), ..Self::default() }
+    }
+
     fn switch(&mut self, tick: usize, input: f64) -> f64 {
         let time = tick as f64;
+        // A relay at rest starts upwards.
+        self.high = if input == 0.0 { tick == 0 || self.high } else { input > 0.0 };
+        let relay = if self.high { 1.0 } else { -1.0 };
+        let output = self.gain.map_or(relay, |gain| (gain * input).clamp(-1.0, 1.0));
+        self.quiet = if output.abs() < SATURATED { self.quiet + 1 } else { 0 };
         if self.rises.len() > SETTLED {
-            self.inputs.push((time, input));
+            self.samples.push((time, [input, output]));
         }
         if tick > 0 && self.last < 0.0 && input >= 0.0 {
             self.rises.push(time - input / (input - self.last));
@@ -140,26 +170,24 @@ impl Relay {
                 self.measure();
             }
         }
-        // A relay at rest starts upwards.
-        self.high = if input == 0.0 { tick == 0 || self.high } else { input > 0.0 };
         self.last = input;
-        if self.high { 1.0 } else { -1.0 }
+        output
     }
 
-    /// Describing function: K_u = 4 d / (π a), with a the first harmonic of the input and d = 1.
+    /// Describing function: K_u is the first harmonic of the output over that of the input; for a relay the former is 4/π.
     fn measure(&mut self) {
         let (first, last) = (self.rises[SETTLED], self.rises[SETTLED + MEASURED]);
         let period = (last - first) / MEASURED as f64;
-        let (mut cosine, mut sine, mut count) = (0.0, 0.0, 0.0);
-        for (time, input) in self.inputs.iter().filter(|(time, _)| *time < last) {
+        let mut sums = [[0.0; 2]; 2];
+        for (time, values) in self.samples.iter().filter(|(time, _)| *time < last) {
             let (s, c) = libm::sincos(2.0 * PI * (time - first) / period);
-            cosine += input * c;
-            sine += input * s;
-            count += 1.0;
+            for (sum, value) in sums.iter_mut().zip(values) {
+                *sum = [sum[0] + value * c, sum[1] + value * s];
+            }
         }
-        let amplitude = 2.0 * libm::hypot(cosine, sine) / count;
-        if period > 0.0 && amplitude > 0.0 {
-            self.found = Some((4.0 / (PI * amplitude), period));
+        let [input, output] = sums.map(|[cosine, sine]| libm::hypot(cosine, sine));
+        if period > 0.0 && input > 0.0 {
+            self.found = Some((output / input, period));
         }
     }
 }
@@ -218,5 +246,26 @@ mod tests {
         assert!((period / 4.0 / delay as f64 - 1.0).abs() < 0.03, "{period}");
         // The wave is a triangle of height L, whose first harmonic is 8 L/π²; K_u is then π/(2 L).
         assert!((gain * 2.0 * delay as f64 / PI - 1.0).abs() < 0.03, "{gain}");
+    }
+
+    /// The same loop: it oscillates with an amplifier of more than K_u, and with one of less it comes to rest.
+    #[test]
+    fn an_amplifier_that_saturates_oscillates_above_the_limit_alone() {
+        let (delay, limit) = (50, PI / 100.0);
+        for (gain, oscillates) in [(1.3 * limit, true), (0.8 * limit, false)] {
+            let mut relay = Relay::saturating(gain);
+            let (mut y, mut line) = (-500.0, std::collections::VecDeque::from(vec![0.0; delay]));
+            for tick in 0..MOST_TICKS {
+                line.push_back(relay.switch(tick, -y));
+                y += line.pop_front().unwrap();
+                if relay.found.is_some() || relay.quiet > QUIET_TICKS {
+                    break;
+                }
+            }
+            assert_eq!(relay.quiet > QUIET_TICKS, !oscillates, "{gain}");
+            if let Some((found, _)) = relay.found {
+                assert!(oscillates && (found / limit - 1.0).abs() < 0.03, "{found} {limit}");
+            }
+        }
     }
 }

@@ -8,10 +8,11 @@
 //! ```text
 //! C = N κ + A N (1 + z⁻¹ N κ) + D        κ = k_p/K + T k_I/(K e) ;   A = (ω1 (e + z⁻¹ ω2) + ω2 e)/e² ;   S = 1/(1 + P C)
 //! ```
-//! D and N, and for the lowest mode of each group of coupled axes κ (for the first of them A, too), minimise a cost by CMA-ES. Targets
-//! over stiffness, λ, lag, delay and damping: the largest |S| below 2; |1 + P C·H| ≥ 0.4 with any single structural mode H of the range;
-//! a compliance peak below half of that without feedback; then tracking, compliance and noise. Bounds are penalties. If not all can be
-//! met, the result is the best compromise, and the check of the whole loop decides.
+//! D and N of the lowest mode of a group of coupled axes and of its partner, the highest of about the same frequency, together with the κ
+//! that they share (for the first group A, too), and then D and N of each other mode, minimise a cost by CMA-ES. Targets over stiffness,
+//! λ, lag, delay and damping: the largest |S| below 2; |1 + P C·H| ≥ 0.4 with any single structural mode H of the range; a compliance
+//! peak below half of that without feedback; then tracking, compliance and noise. Bounds are penalties. If not all can be met, the result
+//! is the best compromise, and the check of the whole loop decides.
 
 mod family;
 
@@ -24,20 +25,22 @@ use super::closed_loop::ClosedLoop;
 use super::law::Tuning;
 use super::notch::{Biquad, in_reach};
 use super::structure::StructureDemand;
-use family::{Family, Feedback};
+use family::{Family, Feedback, Figures, LOW};
 use specgen_language::model::StoredDesign;
-use specgen_numerics::Cma;
+use specgen_numerics::{Cma, ranked};
 use specgen_runtime::Law;
 
 pub use family::SLOW;
 pub(super) use family::target;
 
-/// Evaluations of the cost: for the lowest mode, with gains and bandwidths, and for others.
-const EVALUATIONS: [usize; 2] = [3000, 2000];
+/// Evaluations of the cost in each search: for the lowest modes, with gains and bandwidths, and for others.
+const EVALUATIONS: [usize; 2] = [5000, 1500];
+/// Each start has this part of them; the best goes on alone.
+const STARTING: usize = 4;
 const POPULATION: usize = 14;
 const SEED: u64 = 49;
 /// Raised when a change of this search makes other designs from the same values.
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 
 /// Effect of active damping on a mode; ratios.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -50,7 +53,7 @@ pub struct DampedMode {
     pub slow: [f64; 3],
     /// The same without active damping, by the start rule.
     pub without: [f64; 3],
-    /// Estimated error on a path with corners, relative to that of the start rule: |S| weighted with 1/f, and with the compliance.
+    /// Estimated error on a path with corners, relative to that of the start rule: from hysteresis, corners and ringing.
     pub tracking: f64,
 }
 
@@ -157,15 +160,19 @@ const FACTORS: [Scale; 4] = [
 ];
 /// Damping ratio of the notch; c₀, c₁, c₂, β and ζ of the section, see [`Family::section`].
 const SECTION: [Scale; 6] = [
-    Scale::Logarithmic(0.1, 1.0),
-    Scale::Linear(-0.6, 0.6),
-    Scale::Linear(-0.6, 0.6),
-    Scale::Linear(-0.6, 0.6),
+    Scale::Logarithmic(0.1, 2.0),
+    Scale::Linear(-1.0, 1.0),
+    Scale::Linear(-1.0, 1.0),
+    Scale::Linear(-1.0, 1.0),
     Scale::Logarithmic(0.4, 5.0),
     Scale::Logarithmic(0.05, 2.0),
 ];
-/// Where a search starts: the start rule with a weak section.
-const START: [f64; 6] = [0.9, 0.02, 0.0, 0.06, 1.5, 0.3];
+/// Where searches start, factors and section: the start rule with a weak section; and what is found for a platform like that of the
+/// reference with structural modes from 1.7 times its lowest mode.
+const STARTS: [([f64; 4], [f64; 6]); 2] =
+    [([1.0; 4], [0.9, 0.02, 0.0, 0.06, 1.5, 0.3]), ([3.0, 1.45, 0.5, 0.8], [0.8, -0.5, 0.0, -0.15, 2.4, 0.6])];
+/// The notch of the start rule.
+const RULE: f64 = STARTS[0].1[0];
 
 /// Laws that this process has found, by digest: an editor compiles a spec after every key.
 static FOUND: Mutex<BTreeMap<String, DampedLaw>> = Mutex::new(BTreeMap::new());
@@ -194,61 +201,106 @@ fn searched(of: &ClosedLoop, adapting: Law, start: &Tuning, demand: &StructureDe
     // Of each group, the factors of k_p and k_I; and those of Ω1 and Ω2.
     let mut gains: [Option<[f64; 2]>; 6] = [None; 6];
     let mut bandwidths: Option<[f64; 2]> = None;
-    // Frequency, and what was found for it.
-    let mut found: Vec<(f64, usize)> = Vec::new();
+    // Modes whose section is found.
+    let mut found: Vec<usize> = Vec::new();
+    let frequencies = &of.basis.frequencies;
+    let alike = |a: usize, b: usize| (frequencies[a] - frequencies[b]).abs() < 1e-6 * frequencies[a];
     for mode in 0..6 {
-        let (frequency, group) = (of.basis.frequencies[mode], groups[mode]);
-        if !in_reach(frequency, of.period) {
+        let group = groups[mode];
+        if found.contains(&mode) || !in_reach(frequencies[mode], of.period) {
             continue;
         }
-        let alike = found.iter().find(|(other, _)| (frequency - other).abs() < 1e-6 * frequency);
-        if let Some(&(_, other)) = alike {
+        if let Some(&other) = found.iter().find(|other| alike(mode, **other)) {
             gains[group] = gains[group].or(gains[groups[other]]);
             law.sections[mode] = law.sections[other];
             law.notch_damping[mode] = law.notch_damping[other];
             continue;
         }
-        let family = Family::of(of, mode, adapting, Some(demand));
-        let rule = family.figures(&family.controller(&family.feedback(start), START[0], None));
+        // The gains must suit the lowest mode of a group, and the highest of those about it.
+        let about = |other: &usize| {
+            groups[*other] == group && frequencies[*other] < LOW * frequencies[mode] && !alike(mode, *other)
+        };
+        let partner = (mode + 1..6).rev().find(about).filter(|_| gains[group].is_none());
+        let modes: Vec<usize> = [Some(mode), partner].into_iter().flatten().collect();
+        let families: Vec<(Family, Figures)> = modes
+            .iter()
+            .map(|one| {
+                let family = Family::of(of, *one, adapting, Some(demand));
+                let rule = family.figures(&family.controller(&family.feedback(start), RULE, None));
+                (family, rule)
+            })
+            .collect();
         let free = match (bandwidths, gains[group]) {
             (None, _) => 4,
             (Some(_), None) => 2,
             (Some(_), Some(_)) => 0,
         };
-        let scales: Vec<Scale> = FACTORS[..free].iter().chain(&SECTION).copied().collect();
+        // Modes that come later get the bandwidths that are found now: with the widest notch, they must bear the estimates.
+        let later: Vec<Family> = (mode + 1..6)
+            .filter(|other| bandwidths.is_none() && in_reach(frequencies[*other], of.period))
+            .filter(|other| !modes.iter().any(|one| alike(*one, *other)))
+            .map(|other| Family::of(of, other, adapting, Some(demand)))
+            .collect();
+        let sections = SECTION.repeat(modes.len());
+        let scales: Vec<Scale> = FACTORS[..free].iter().chain(&sections).copied().collect();
         let decode = |x: &[f64]| {
             let values: Vec<f64> = scales.iter().zip(x).map(|(scale, part)| scale.value(*part)).collect();
-            let (own, section) = values.split_at(free);
+            let (own, sections) = values.split_at(free);
             let [k_p, k_i] =
                 gains[group].unwrap_or([own.first().copied().unwrap_or(1.0), own.get(1).copied().unwrap_or(1.0)]);
             let [level, drift] =
                 bandwidths.unwrap_or([own.get(2).copied().unwrap_or(1.0), own.get(3).copied().unwrap_or(1.0)]);
-            ([k_p, k_i, level, drift], section.to_vec())
+            ([k_p, k_i, level, drift], sections.to_vec())
         };
-        let start_at: Vec<f64> = scales
-            .iter()
-            .zip([1.0].repeat(free).iter().chain(&START))
-            .map(|(scale, value)| scale.part(*value))
-            .collect();
-        let cost = |x: &[f64]| {
-            let (factors, section) = decode(x);
-            let feedback = family.feedback(&scaled(start, factors));
-            let figures = family.figures(&family.controller(&feedback, section[0], Some(&section[1..])));
-            // The sections alone, for which gains without estimates are chosen later, and the estimates alone.
-            let still = Feedback { gains: [0.0; 2], weights: [0.0; 2] };
-            let still = family.controller(&still, section[0], Some(&section[1..]));
-            let estimates = family.controller(&Feedback { gains: [0.0; 2], ..feedback }, section[0], None);
-            figures.cost(&rule)
-                + family.penalty(&still, family.spare_range.as_ref())
-                + family.penalty(&estimates, family.bare_range.as_ref())
+        let starts = STARTS.map(|(factors, section)| -> Vec<f64> {
+            let values = factors[..free].iter().copied().chain(section.repeat(modes.len()));
+            scales.iter().zip(values).map(|(scale, value)| scale.part(value)).collect()
+        });
+        // Not counted further above `most`: cheap terms come first.
+        let cost = |x: &[f64], most: f64| {
+            let (factors, sections) = decode(x);
+            let tuning = scaled(start, factors);
+            let mut sum = 0.0;
+            let sections = families.iter().zip(sections.chunks(SECTION.len()));
+            let mut loops: Vec<_> = sections
+                .clone()
+                .map(|((family, rule), section)| {
+                    let feedback = family.feedback(&tuning);
+                    let controller = family.controller(&feedback, section[0], Some(&section[1..]));
+                    let figures = family.nominal_figures(&controller);
+                    sum += figures.cost(rule);
+                    (controller, figures)
+                })
+                .collect();
+            // The estimates alone, and the sections alone, for which gains without estimates are chosen later.
+            let estimates =
+                families.iter().map(|(family, _)| family).zip(sections.clone().map(|(_, section)| section[0]));
+            for (family, notch_damping) in estimates.chain(later.iter().map(|family| (family, SECTION[0].value(1.0)))) {
+                let alone = Feedback { gains: [0.0; 2], ..family.feedback(&tuning) };
+                let alone = family.controller(&alone, notch_damping, None);
+                sum += family.penalty(&alone, family.bare_range.as_ref(), most - sum);
+            }
+            for ((family, _), section) in sections.clone() {
+                let still = Feedback { gains: [0.0; 2], weights: [0.0; 2] };
+                let still = family.controller(&still, section[0], Some(&section[1..]));
+                sum += family.penalty(&still, family.spare_range.as_ref(), most - sum);
+            }
+            for ((family, rule), (controller, figures)) in families.iter().zip(&mut loops) {
+                let others = sum - figures.cost(rule);
+                family.add_corners(controller, figures, |figures| others + figures.cost(rule) <= most);
+                sum = others + figures.cost(rule);
+            }
+            sum
         };
-        let best = minimise(&start_at, EVALUATIONS[usize::from(free < 4)], cost);
-        let (factors, section) = decode(&best);
+        let best = minimise(&starts, EVALUATIONS[usize::from(free < 4)], cost);
+        let (factors, sections) = decode(&best);
         gains[group] = Some([factors[0], factors[1]]);
         bandwidths = Some([factors[2], factors[3]]);
-        law.notch_damping[mode] = section[0];
-        law.sections[mode] = family.section(&section[1..]);
-        found.push((frequency, mode));
+        for ((one, (family, _)), section) in modes.iter().zip(&families).zip(sections.chunks(SECTION.len())) {
+            law.notch_damping[*one] = section[0];
+            law.sections[*one] = family.section(&section[1..]);
+            found.push(*one);
+        }
     }
     let [level, drift] = bandwidths.unwrap_or([1.0; 2]);
     law.tuning.level_bandwidth *= level;
@@ -267,7 +319,7 @@ pub(super) fn effect(of: &ClosedLoop, adapting: Law, start: &Tuning, law: &Dampe
     let modes = core::array::from_fn(|mode| {
         in_reach(of.basis.frequencies[mode], of.period).then(|| {
             let family = Family::of(of, mode, adapting, None);
-            let rule = family.figures(&family.controller(&family.feedback(start), START[0], None));
+            let rule = family.figures(&family.controller(&family.feedback(start), RULE, None));
             let responses =
                 family.with_section(&family.feedback(&law.tuning), law.notch_damping[mode], &law.sections[mode]);
             let figures = family.figures(&responses);
@@ -283,22 +335,35 @@ pub(super) fn effect(of: &ClosedLoop, adapting: Law, start: &Tuning, law: &Dampe
     ActiveDamping { sections: law.sections, modes }
 }
 
-fn minimise(start: &[f64], evaluations: usize, cost: impl Fn(&[f64]) -> f64) -> Vec<f64> {
-    let mut cma = Cma::new(start, POPULATION, SEED);
-    let mut best = (start.to_vec(), cost(start));
-    let mut spent = 1;
-    while spent < evaluations {
-        let points = cma.ask();
-        let costs: Vec<Option<f64>> = points.iter().map(|point| Some(cost(point))).collect();
-        spent += points.len();
-        for (point, value) in points.iter().zip(costs.iter().flatten()) {
-            if *value < best.1 {
-                best = (point.clone(), *value);
+/// The best point of searches from each start, of which only the best goes on after a part of the evaluations. `cost` may stop to count
+/// above the number that it is given.
+fn minimise(starts: &[Vec<f64>], evaluations: usize, cost: impl Fn(&[f64], f64) -> f64) -> Vec<f64> {
+    let mut searches: Vec<_> =
+        starts.iter().map(|start| (cost(start, f64::MAX), start.clone(), Cma::new(start, POPULATION, SEED))).collect();
+    for part in [evaluations / STARTING, evaluations - evaluations / STARTING] {
+        for (least, best, cma) in &mut searches {
+            let mut spent = 0;
+            while spent < part {
+                let points = cma.ask();
+                let half = points.len() / 2;
+                spent += points.len();
+                let mut costs: Vec<Option<f64>> = Vec::new();
+                for point in points {
+                    // Only the better half of a generation matters.
+                    let most = ranked(&costs).get(half - 1).and_then(|at| costs[*at]).unwrap_or(f64::MAX);
+                    let value = cost(&point, most);
+                    costs.push(Some(value));
+                    if value < *least {
+                        (*least, *best) = (value, point);
+                    }
+                }
+                cma.tell(&costs);
             }
         }
-        cma.tell(&costs);
+        searches.sort_by(|(one, ..), (other, ..)| one.total_cmp(other));
+        searches.truncate(1);
     }
-    best.0
+    searches.swap_remove(0).1
 }
 
 /// `start` with its k_p, k_I, Ω1 and Ω2 times the factors.
