@@ -26,7 +26,7 @@ const FOLDERS: [&str; 13] = [
 const FIRMWARE: &str = "../../firmware";
 
 /// Extensions of copied files; others may be left by an editor.
-const KINDS: [&str; 6] = ["json", "lock", "md", "rs", "toml", "x"];
+const KINDS: [&str; 7] = ["csv", "json", "lock", "md", "rs", "toml", "x"];
 
 /// First line of a copied source file.
 const LICENCE: &str = "SPDX-License-Identifier: MIT OR Apache-2.0";

@@ -15,7 +15,7 @@ use std::fmt::Write as _;
 
 const GRID: usize = 32;
 const NODES: usize = (GRID + 1) * (GRID + 2) / 2;
-const TERMS: usize = 3;
+const TERMS: usize = 6;
 const RANGE: [f64; 2] = [-90.0, 90.0];
 const PERIOD: f64 = 1e-4;
 /// Steps of the plant in a tick.
@@ -49,6 +49,9 @@ fn lowered(found: &RateIdentification, option: RateOption, earlier: f64) -> ir::
         ("range = [\"0 V\", \"150 V\"]", "range = [\"0 V\", \"200 V\"]"),
         ("memory  = 64\nrecords = [\"records/reference-forc.csv\"]  # one for all six legs, or six", &lines),
         ("mode         = \"pcc\"", "mode = \"invhys\""),
+        // Unused, and too large for a leg that rings at 742 Hz.
+        ("level_weight = 0.252              # omega_1, per run\n", ""),
+        ("drift_weight = 0.011              # omega_2, per run\n", ""),
         ("period = \"200 us\"", "period = \"100 us\""),
         ("[\"40 um\", \"40 um\", \"40 um\"]", "[\"1 um\", \"1 um\", \"1 um\"]"),
         ("[\"0.4 mrad\", \"0.35 mrad\", \"0.5 mrad\"]", "[\"0.001 mrad\", \"0.001 mrad\", \"0.001 mrad\"]"),

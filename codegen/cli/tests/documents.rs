@@ -36,7 +36,8 @@ fn links_lead_somewhere() {
                 let file = if file.is_empty() { repository().join(&name) } else { folder.join(file) };
                 assert!(file.exists(), "{name} links to {target}");
                 let is_heading = |line: &str| {
-                    line.starts_with('#') && line.to_lowercase().replace(' ', "-").replace('.', "").ends_with(&format!("#-{anchor}"))
+                    line.starts_with('#')
+                        && line.to_lowercase().replace(' ', "-").replace('.', "").ends_with(&format!("#-{anchor}"))
                 };
                 let found = anchor.is_empty() || fs::read_to_string(file).unwrap().lines().any(is_heading);
                 assert!(found, "{name} links to {target}");

@@ -68,6 +68,7 @@ fn without_tools_everything_else_is_done_and_one_line_says_what_was_left_out() {
 }
 
 #[test]
+#[ignore = "long: missing tools are in the short run"]
 fn set_up_that_fails_says_what_was_tried_and_the_job_goes_on() {
     let folder = Folder::new();
     let nothing = tempfile::tempdir().unwrap();

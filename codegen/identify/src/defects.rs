@@ -29,7 +29,9 @@ use specgen_numerics::nnls;
 /// Grid of the table, and most samples in its fit; a longer record is decimated evenly.
 const GRID: usize = 16;
 const SAMPLES: usize = 100_000;
-/// Half width of the neighbourhood, s, which has these least and most samples. A spike is at most two thirds as long.
+/// Longest spike, s, at a third of its height.
+const LONGEST: f64 = 1e-3;
+/// Half width of the neighbourhood, s, which has these least and most samples.
 const WIDTH: f64 = 1.5e-3;
 const NEAR: [f64; 2] = [12.0, 100.0];
 /// A spike may always have so many samples.
@@ -184,11 +186,12 @@ fn spikes(record: &mut Record, residual: &mut Residual, half: usize, least: f64,
         found.push((from, (peak..off.len()).take_while(flank).last().unwrap_or(peak) + 1));
     }
     // What is longer is an error of the model. Flanks may reach over the neighbourhood where such an error is beside them.
+    let interval = median_interval(&record.time);
     let lasts = |from: usize, end: usize| record.time[first + end - 1] - record.time[first + from];
     found.retain(|&(from, end)| {
         let height = off[from..end].iter().fold(0.0, |most, x| libm::fmax(most, x.abs()));
         let high = off[from..end].iter().filter(|x| 3.0 * x.abs() > height).count();
-        high <= FEW || 3 * high <= 2 * half && lasts(from, end) <= 2.0 * WIDTH
+        high <= FEW || high as f64 * interval <= LONGEST && lasts(from, end) <= 2.0 * WIDTH
     });
     residual.drop_gathered(&mut found, |defect| *defect, half);
     for &(from, end) in &found {

@@ -10,7 +10,8 @@
 //! the creep is free. Plays become a table: E(a, b) is what they gain on the way from b to a.
 //!
 //! Families are compared in displacement on whole curves that were held out, in folds. The simplest one whose error is
-//! within one standard error of the best, or a fifth of its error, is chosen; the Everett table is the simplest.
+//! within one standard error of the best, or a tenth of its error and a fifth of the noise, is chosen; the Everett
+//! table is the simplest.
 
 mod families;
 mod family;
@@ -73,12 +74,16 @@ impl Around {
     /// What is wrong with a value.
     pub fn checked(self) -> Result<Self, String> {
         let positive = self.travel_um > 0.0 && self.slope >= 0.0 && self.creep.len() <= MOST_CREEP_TERMS;
-        let saturates = self.slope == 0.0 || self.beta + self.gamma > 0.0;
+        let (plus, minus) = (self.beta + self.gamma, self.beta - self.gamma);
+        // |z| stays below its limit, slope / (β + γ).
+        let bounded = plus > 0.0 && minus > -plus && self.rest_um.abs() * plus <= self.slope * (1.0 + 1e-6);
+        let saturates = bounded || self.slope == 0.0 && self.rest_um == 0.0;
         let creeps = self.creep.iter().all(|[time, weight]| *time > 0.0 && (0.0..1.0).contains(weight));
         if !(positive && saturates && creeps) {
             return Err(format!(
-                "travel_um > 0, slope_um_per_V >= 0, beta + gamma > 0 and at most {MOST_CREEP_TERMS} creep operators \
-                 with times > 0 and weights from 0 to 1 are expected"
+                "travel_um > 0, slope_um_per_V >= 0, beta + gamma > 0, beta > 0, rest_um at most slope_um_per_V / \
+                 (beta + gamma) and at most {MOST_CREEP_TERMS} creep operators with times > 0 and weights from 0 to 1 \
+                 are expected"
             ));
         }
         match self.inverse() {

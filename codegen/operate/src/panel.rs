@@ -298,13 +298,12 @@ impl Panel {
         // What the machine did meanwhile is unknown.
         (self.next, self.published, self.wave, self.known) = (None, None, Value::Null, json!({}));
         self.blocks.clear();
+        self.rest = RestError::default();
         let mut tried = Instant::now();
         let mut why = String::new();
         while !operator.is_interrupted() {
             self.clients.listen(LOOK);
-            while let Some((page, command)) = self.clients.next() {
-                self.clients.answer(page, command.id(), Err("no link to the machine"));
-            }
+            self.refuse();
             if self.stated.elapsed() >= STATE {
                 self.stated = Instant::now();
                 self.clients.publish(&json!({ "k": "lost", "t": now(), "why": why }));
@@ -312,11 +311,19 @@ impl Panel {
             if tried.elapsed() < STATE {
                 continue;
             }
+            let begun = Instant::now();
             let opened = reopen().map(|mut session| self.begin(&mut session).map(|()| session));
             // An attempt at a device that does not answer takes seconds, in which pages are not heard.
-            self.clients.excuse();
+            if begun.elapsed() >= STATE {
+                self.clients.excuse();
+            }
             match opened {
                 Ok(Ok(session)) => {
+                    // What pages asked for during the attempt, they asked of a machine whose state nobody knew.
+                    for _ in 0..2 {
+                        self.clients.listen(Duration::ZERO);
+                    }
+                    self.refuse();
                     self.clients.note("note", "The machine answers again.", "", None);
                     return Some(session);
                 }
@@ -327,6 +334,13 @@ impl Panel {
             tried = Instant::now();
         }
         None
+    }
+
+    /// Refuses the commands of pages.
+    fn refuse(&mut self) {
+        while let Some((page, command)) = self.clients.next() {
+            self.clients.answer(page, command.id(), Err("no link to the machine"));
+        }
     }
 
     /// Starts the stream of samples, at the highest useful rate that the line permits.
@@ -344,7 +358,12 @@ impl Panel {
         self.clients.listen(Duration::ZERO);
         if let Some((who, request)) = self.clients.urgent() {
             operator.in_control = true;
-            operator.session.supervise(request)?;
+            let sent = operator.session.supervise(request).map_err(SessionError::from);
+            // One that a broken link kept back is sent after reconnecting.
+            if !matches!(sent, Err(SessionError::Link(_))) {
+                self.clients.sent();
+            }
+            sent?;
             let what = if request == Request::Hold { "hold" } else { "ramp down" };
             self.clients.note("note", &format!("{who} requested: {what}."), "", None);
             if self.is_busy {

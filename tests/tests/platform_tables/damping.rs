@@ -119,6 +119,7 @@ fn damped_machines_follow_and_hold_better_than_undamped_ones() {
 /// In contact and without estimates, only the integral corrects the unknown force. P/F with Invhys has the same as P, and a
 /// feed-forward besides.
 #[test]
+#[ignore = "long: four motions"]
 fn without_estimates_feed_forward_halves_the_error_of_p_on_glass() {
     let other = [(); 2].map(|()| OnceLock::<Bench>::new());
     let mut benches = vec![("plays", reference_machine()), ("plays, damped", damped_machine())];
@@ -173,6 +174,6 @@ fn the_relay_test_of_tune_finds_the_limit_of_the_damped_loop() {
             assert!(gain / expected > 0.8 && gain / expected < 1.2, "{gain} {expected}");
         }
         // Active damping is in the loop.
-        assert!((damped.0 / bare.0 - 1.0).abs() > 0.01);
+        assert!((damped.0 / bare.0 - 1.0).abs() > 0.01 && (damped.2 / bare.2 - 1.0).abs() > 0.01);
     }
 }

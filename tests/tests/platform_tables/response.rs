@@ -93,7 +93,7 @@ fn a_machine_that_is_not_its_spec_learns_with_its_own_response() {
             let modes = model.mode_measurements(&response);
             let with = Learnable::of(compiled).unwrap().with(Response::read(&response.to_json()).unwrap());
             let convergence = with.convergence(&Factors::of(&compiled.model, &[]), WISH).unwrap();
-            let own = learned(machine, &with, &convergence, 6);
+            let own = learned(machine, &with, &convergence, 8);
             (modes, convergence, own)
         });
         (limited, blind, modes, convergence, own)

@@ -124,6 +124,7 @@ fn every_range_is_borne_on_both_classes_of_legs() {
 
 /// What the bars are for: a law that was not designed for structural modes oscillates with one of them.
 #[test]
+#[ignore = "long: that every mode of the range is tolerated is in the short run"]
 fn a_law_for_a_better_structure_oscillates_with_a_mode_below_its_range() {
     let edits = edits("4900");
     let edits = edits.each_ref().map(|(from, to)| (*from, to.as_str()));

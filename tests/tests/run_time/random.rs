@@ -59,8 +59,8 @@ fn common(random: &mut ChaCha8Rng, base: &Compilation, folder: &Path) -> Vec<Par
     let (model, grid) = (&base.model, base.ir.hysteresis.grid);
     let [low, high] = model.actuator.voltage;
     let file = "second-weight.csv";
-    // A second weight of either sign, a thousandth of the travel at the rates of a leg.
-    let size = 1e-5 * model.actuator.stroke;
+    // A second weight of either sign, of a size that can be inverted at most periods.
+    let size = 3e-6 * model.actuator.stroke;
     let nodes = (1..=grid).flat_map(|up| {
         (0..up).map(move |down| {
             let (u, d) = (up as f64 / grid as f64, down as f64 / grid as f64);

@@ -47,7 +47,7 @@ fn sequences_of_six_legs_have_the_same_bits_on_the_m7() {
 }
 
 #[test]
-#[ignore = "long: a platform; its samples and its oscillations are compared in the test run"]
+#[ignore = "long: a platform; its samples are compared in the test run"]
 fn sequences_of_a_platform_have_the_same_bits_on_the_m7() {
     compare("supervisor-bits-platform", Kind::Platform, &[], Mcu::Mps2An500, specgen_tests::length(150, 10_000));
 }

@@ -30,7 +30,7 @@ pub struct Arguments {
     #[arg(long, value_name = "HZ", value_parser = frequency, allow_negative_numbers = true)]
     frequency: Option<f64>,
     /// Largest number of learning passes; one more pass measures the result. Learning ends early after two passes in a row
-    /// without improvement, or one that is worse.
+    /// without improvement, or the third that is worse.
     #[arg(long, value_name = "N", default_value_t = 5, allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(0..=1000))]
     passes: u32,
     /// Highest frequency to learn, Hz; lowered until every machine within [robust] converges. With --excite, the sweeps reach 1.6

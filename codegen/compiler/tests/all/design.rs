@@ -22,6 +22,7 @@ fn gains_of(tuning: &Tuning) -> Gains {
 }
 
 #[test]
+#[ignore = "long: six designs; gains that are not robust are refused in the short run"]
 fn the_start_rule_gives_robust_values_with_and_without_notch() {
     for notch in [Some(1.0), Some(0.5), None] {
         for rate in [2e3, 5e3, 1e4, 2e4] {

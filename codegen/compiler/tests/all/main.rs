@@ -280,6 +280,7 @@ fn predicted_limits_hold_in_a_fine_step_simulation() {
 }
 
 #[test]
+#[ignore = "long: the limits in a fine step simulation are in the short run"]
 fn predicted_limits_hold_with_velocity_feedback_and_with_a_work_piece() {
     let (mut tuning, closed_loop) = base("U");
     tuning.derivative = [785.0, 785.0, 1591.0, 16.5, 16.5, 10.2];
@@ -297,6 +298,7 @@ fn predicted_limits_hold_with_velocity_feedback_and_with_a_work_piece() {
 }
 
 #[test]
+#[ignore = "long: the limits in a fine step simulation are in the short run"]
 fn predicted_limits_hold_behind_gauges_that_lag() {
     // An AD7606 at ±5 V, and a capacitive gauge of 500 Hz.
     for gauge_lag in [15e-6, 0.32e-3] {

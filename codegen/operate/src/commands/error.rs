@@ -25,6 +25,8 @@ pub enum SessionError {
 impl From<ClientError> for SessionError {
     fn from(error: ClientError) -> Self {
         match error {
+            // A board that was reset knows no session.
+            ClientError::Refused(Refusal::NoSession | Refusal::Sequence) => Self::Link(error),
             ClientError::Refused(_) => Self::Refused(error.to_string()),
             other => Self::Link(other),
         }

@@ -283,11 +283,14 @@ impl Clients {
         self.waiting.pop_front()
     }
 
-    /// Takes a requested stop, and the name of its page.
-    pub fn urgent(&mut self) -> Option<(String, Request)> {
-        let (page, request) = self.urgent.take()?;
-        self.is_left = false;
-        Some((named(page), request))
+    /// A requested stop, and the name of its page.
+    pub fn urgent(&self) -> Option<(String, Request)> {
+        self.urgent.map(|(page, request)| (named(page), request))
+    }
+
+    /// The machine has answered the requested stop.
+    pub fn sent(&mut self) {
+        (self.urgent, self.is_left) = (None, false);
     }
 
     /// Whether a page requests hold or ramp-down.

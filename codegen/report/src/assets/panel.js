@@ -64,7 +64,7 @@
       if (!message.ok) note("warning", message.why + (/[.!]$/.test(message.why) ? "" : "."));
       if (then) then(message);
     } else if (message.k === "end") { ended = message.why; state = null; }
-    else if (message.k === "lost") { lost = message; state = left = null; stated = performance.now(); say({ do: "seen", number: sent }); controls(); allow(by("hold"), "", "sent when the link is back"); }
+    else if (message.k === "lost") { lost = message; state = left = null; stated = performance.now(); say({ do: "seen", number: sent }); controls(); unlinked(); allow(by("hold"), "", "sent when the link is back"); }
     else {
       const now = performance.now();
       stated = now;
@@ -235,6 +235,13 @@
 
   // ── Controls ──
   let moves = [];
+
+  // Nothing but a stop can be asked of a machine without a link.
+  function unlinked() {
+    moves.forEach(one => { one.disabled = true; });
+    ["arm", "run", "acknowledge", "bias", "play", "record", "download", "apply", "restore"].forEach(id => allow(by(id), "no link"));
+  }
+
   function controls() {
     by("banner").hidden = !(state && state.known && (state.known.differ || []).length);
     if (!state || !state.status) return;

@@ -42,6 +42,8 @@ pub(super) enum Verdict {
     Keep,
     /// Within the noise: continue learning, discard the correction.
     GoOn,
+    /// Worse: discard the correction, which changed too much.
+    Worse,
     /// Stop learning, discard the correction.
     Stop,
 }
@@ -77,6 +79,10 @@ impl Judge {
             Some(Ordering::Equal) if !self.idle => {
                 self.idle = true;
                 Verdict::GoOn
+            }
+            Some(Ordering::Greater) => {
+                self.idle = false;
+                Verdict::Worse
             }
             _ => Verdict::Stop,
         }
@@ -212,16 +218,17 @@ mod tests {
     }
 
     #[test]
-    fn two_passes_without_improvement_or_one_worse_pass_stop_learning() {
+    fn two_passes_without_improvement_or_one_without_a_number_stop_learning() {
         let before = |tick: usize| if (tick / 20).is_multiple_of(2) { 3.1 } else { 2.9 };
         let judged = |passes: &[f64]| -> Vec<Verdict> {
             let mut judge = Judge::new(score(|tick| 6.0 - before(tick), 1.0), &score(before, 1.0));
             passes.iter().map(|x| judge.judge(score(|_| *x, 1.0))).collect()
         };
-        use Verdict::{GoOn, Keep, Stop};
+        use Verdict::{GoOn, Keep, Stop, Worse};
         assert_eq!(judged(&[1.0, 0.99, 0.5, 0.5, 0.49]), [Keep, GoOn, Keep, GoOn, Stop]);
         assert_eq!(judged(&[2.99, 3.0]), [GoOn, Stop]);
-        assert_eq!(judged(&[4.4]), [Stop]);
+        assert_eq!(judged(&[4.4]), [Worse]);
+        assert_eq!(judged(&[1.0, 0.99, 2.0, 0.99, 0.99]), [Keep, GoOn, Worse, GoOn, Stop]);
         assert_eq!(judged(&[1.0, f64::NAN]), [Keep, Stop]);
     }
 

@@ -32,6 +32,9 @@ const LEGS: u32 = 0x3f;
 const CORRECTION_LIMITED: u32 = 1 << 20;
 /// The error counts as growing above this multiple of the smallest one.
 const GROWS: f64 = 1.5;
+/// Least part of its correction that the host learns after worse passes. Each halves it: then what the response does not
+/// know, as hysteresis of another slope, no longer turns a change into more error.
+const LEAST_SHARE: f64 = 0.25;
 /// Headroom of a sufficient limit: later passes change a correction further.
 const HEADROOM: f64 = 1.2;
 
@@ -118,6 +121,11 @@ impl Session<'_> {
         }
     }
 
+    /// Whether a part of a correction can be learned: a device learns the whole of it.
+    fn can_share(&self) -> bool {
+        matches!(self, Self::Host(..))
+    }
+
     /// The correction of the next pass, from the one `played` and the observations of passes under it, the last one `seen`.
     fn next(
         &mut self,
@@ -134,6 +142,19 @@ impl Session<'_> {
             }
         }
     }
+}
+
+/// Knots a `share` of the way from one correction to another; none are zero.
+fn between(from: &[Knot], to: Vec<Knot>, share: f64) -> Vec<Knot> {
+    let part = |from: i32, to: i32| {
+        let [from, to] = [f64::from(from), f64::from(to)];
+        libm::round(from + share * (to - from)) as i32
+    };
+    let knot = |(k, to): (usize, &Knot)| {
+        let from = from.get(k).copied().unwrap_or_default();
+        std::array::from_fn(|axis| part(from[axis], to[axis]))
+    };
+    if share < 1.0 { to.iter().enumerate().map(knot).collect() } else { to }
 }
 
 /// What a pass shows where a correction may be.
@@ -331,8 +352,9 @@ impl LearningResult {
 }
 
 /// Makes up to `count` passes after the first and learns from each. A correction is kept if its pass is better than the best one before it by
-/// more than the noise of both, and not worse than the first pass in translation or angles. A pass worse by more than the noise ends learning,
-/// and so do two consecutive passes without improvement. Two passes before the first do not count: only after one pass is the hysteresis
+/// more than the noise of both, and not worse than the first pass in translation or angles. After a pass worse by more than the noise,
+/// the host learns half as much from the best one; the third such pass ends learning, and so do two consecutive passes
+/// without improvement. A device ends at the first. Two passes before the first do not count: only after one pass is the hysteresis
 /// as in every repetition, and the second shows the differences between repetitions. `begin` is the correction of these three; no knots means
 /// no correction. If the machine ends a pass after the first, learning ends. `watch` is called after each pass and may stop learning.
 ///
@@ -366,7 +388,7 @@ pub fn learn(
         sufficient_nm: first.limited().then(|| 1e9 * sufficient(begin, motion, spacing)),
         ending: Ending::AllPasses,
     };
-    let mut number = 0;
+    let (mut number, mut share, mut best) = (0, 1.0, seen.clone());
     let mut go_on = watch(0, &first);
     while let Some((judge, session)) = session.as_mut().filter(|_| number < count) {
         if go_on.is_break() {
@@ -376,7 +398,7 @@ pub fn learn(
         number += 1;
         let made = session.next(machine, motion, (&played, before.take(), &seen), spacing);
         let passed = made.and_then(|made| {
-            played = made;
+            played = between(&played, made, share);
             followed(machine.pass(motion, &played, spacing)?)
         });
         seen = match passed {
@@ -396,8 +418,11 @@ pub fn learn(
         go_on = watch(number, &pass);
         let found = judge.judge(Score::of(&seen, motion));
         if found == Verdict::Keep {
-            (learned.best, learned.knots) = (number, played.clone());
-        } else if found == Verdict::Stop {
+            (learned.best, learned.knots, best) = (number, played.clone(), seen.clone());
+        } else if found == Verdict::Worse && share > LEAST_SHARE && session.can_share() {
+            share *= 0.5;
+            (played, seen) = (learned.knots.clone(), best.clone());
+        } else if found != Verdict::GoOn {
             // NaN counts as growth.
             let within =
                 matches!(pass.measured_nm.partial_cmp(&(GROWS * least)), Some(Ordering::Less | Ordering::Equal));

@@ -110,7 +110,11 @@ fn one_axis(
     let mut relay = Relay::default();
     let mut asked = [0.0; 6];
     let mut lowest = None;
-    for tick in 0..MOST_TICKS {
+    let mut begun = 0;
+    for tick in 0.. {
+        if tick - begun >= MOST_TICKS {
+            break;
+        }
         let pose = bench.rig().plant().pose();
         let error: [f64; 6] = std::array::from_fn(|k| center[k] - pose[k]);
         let output = relay.switch(tick, notch.filter(&error)[axis] / amplitude);
@@ -120,7 +124,7 @@ fn one_axis(
                 break;
             }
             lowest = Some(Ultimate { gain, period: period * options.interval });
-            relay = Relay::saturating(LOWER * gain);
+            (relay, begun) = (Relay::saturating(LOWER * gain), tick);
         } else if relay.quiet > QUIET_TICKS {
             break;
         }

@@ -218,7 +218,8 @@ fn searched(of: &ClosedLoop, adapting: Law, start: &Tuning, demand: &StructureDe
         }
         // The gains must suit the lowest mode of a group, and the highest of those about it.
         let about = |other: &usize| {
-            groups[*other] == group && frequencies[*other] < LOW * frequencies[mode] && !alike(mode, *other)
+            let near = frequencies[*other] < LOW * frequencies[mode] && in_reach(frequencies[*other], of.period);
+            groups[*other] == group && near && !alike(mode, *other)
         };
         let partner = (mode + 1..6).rev().find(about).filter(|_| gains[group].is_none());
         let modes: Vec<usize> = [Some(mode), partner].into_iter().flatten().collect();
