@@ -63,25 +63,25 @@ const HUMS: usize = 3;
 /// `record` without its defects, for a table over `range` (V). A record that no coarse table can be fitted to is
 /// returned as it is.
 pub(crate) fn repaired(record: &Record, range: [f64; 2], grid: usize, findings: &mut Findings) -> Record {
-    let mut mended = record.clone();
-    let plane = Plane { grid: if grid < GRID { grid } else { GRID }, range };
-    selection::mask_unknown(&mut mended, &plane, findings);
     let size = record.displacement_range();
+    let mut record = record.clone();
+    let plane = Plane { grid: if grid < GRID { grid } else { GRID }, range };
+    selection::mask_unknown(&mut record, &plane, findings);
     for _ in 0..PASSES {
-        let Some(mut residual) = residual(&mended, &plane) else { break };
+        let Some(mut residual) = residual(&record, &plane) else { break };
         let half = half_width(&record.time);
-        let spikes = spikes(&mut mended, &mut residual, half, LEAST * size, findings);
-        if !(steps(&mut mended, &mut residual, half, LEAST * size, findings) || spikes) {
+        let spikes = spikes(&mut record, &mut residual, half, LEAST * size, findings);
+        if !(steps(&mut record, &mut residual, half, LEAST * size, findings) || spikes) {
             break;
         }
     }
     for _ in 0..HUMS {
-        let Some(residual) = residual(&mended, &plane) else { break };
-        if !hum(&mut mended, &plane, &residual, size, findings) {
+        let Some(residual) = residual(&record, &plane) else { break };
+        if !hum(&mut record, &plane, &residual, size, findings) {
             break;
         }
     }
-    mended
+    record
 }
 
 fn half_width(time: &[f64]) -> usize {

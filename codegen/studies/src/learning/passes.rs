@@ -32,8 +32,8 @@ const LEGS: u32 = 0x3f;
 const CORRECTION_LIMITED: u32 = 1 << 20;
 /// The error counts as growing above this multiple of the smallest one.
 const GROWS: f64 = 1.5;
-/// Least part of its correction that the host learns after worse passes. Each halves it: then what the response does not
-/// know, as hysteresis of another slope, no longer turns a change into more error.
+/// Least share of its update that the host applies; each worse pass halves it. A smaller update converges where the response is less
+/// accurate, such as with hysteresis of another slope.
 const LEAST_SHARE: f64 = 0.25;
 /// Headroom of a sufficient limit: later passes change a correction further.
 const HEADROOM: f64 = 1.2;
@@ -144,7 +144,7 @@ impl Session<'_> {
     }
 }
 
-/// Knots a `share` of the way from one correction to another; none are zero.
+/// Knots a `share` (0 to 1) of the way from one correction to another. Knots that the first lacks count as zero.
 fn between(from: &[Knot], to: Vec<Knot>, share: f64) -> Vec<Knot> {
     let part = |from: i32, to: i32| {
         let [from, to] = [f64::from(from), f64::from(to)];
