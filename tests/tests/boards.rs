@@ -84,18 +84,23 @@ const STACK: &str = "bytes of stack";
 /// One build at a time.
 static BUILD: Mutex<()> = Mutex::new(());
 
-/// The image; none, and a line that says so, without a cross compiler where that is permitted.
+/// The image of the board; none, and a line that says so, without a cross compiler where that is permitted.
 fn image_of(board: &Board) -> Option<Image> {
+    let image = program_of(board, board.folder)?;
+    keep(board, &image.elf);
+    Some(image)
+}
+
+/// A program of the emitted workspace, built for the board.
+fn program_of(board: &Board, program: &str) -> Option<Image> {
     let _one = BUILD.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
     let toolchain = target::found_or_skipped(toolchain::find()).unwrap_or_else(|missing| panic!("{missing}"))?;
     let compiled = compile_edited(board.name, "reference.toml", board.edits, &[]);
     let dir = scratch(board.name);
-    let files = workspace::files_with(&compiled.ir, &emit::emit(&compiled.ir), &[board.folder]);
+    let files = workspace::files_with(&compiled.ir, &emit::emit(&compiled.ir), &[program]);
     workspace::write_scratch(&dir, &files).unwrap();
-    let built = build::build_folder(&toolchain, &dir, board.folder, board.mcu(), &image_target(), false);
-    let image = built.unwrap_or_else(|error| panic!("{error}"));
-    keep(board, &image.elf);
-    Some(image)
+    let built = build::build_folder(&toolchain, &dir, program, board.mcu(), &image_target(), false);
+    Some(built.unwrap_or_else(|error| panic!("{error}")))
 }
 
 /// Image and spec for `cargo xtask test --full`, which then runs them on an emulated board.
@@ -205,6 +210,12 @@ fn no_path_of_this_machine_is_in_flash(board: &Board, elf: &[u8]) {
 #[test]
 fn every_board_is_tested() {
     assert_eq!(BOARDS.map(|board| board.folder), [H743.folder, F446.folder]);
+}
+
+/// `specgen build` runs it on the emulated core, to estimate the longest tick; the full run does so.
+#[test]
+fn the_program_that_times_a_tick_is_built() {
+    program_of(&H743, "tick");
 }
 
 #[test]

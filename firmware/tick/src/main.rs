@@ -80,7 +80,7 @@ fn run() -> Result<(), Exit> {
     exchange.record(words, kept);
     exchange.show(samples, u32::MAX);
     let _ = exchange.watch(WATCHED);
-    exchange.orders.request = Request::Run;
+    exchange.command.request = Request::Run;
     let wave = Wave::new(waves::limits(&exchange.config));
     let bench = &Bench::new(rates()?);
     let mut lines = [(); triggers::LINES].into_iter();
@@ -107,7 +107,7 @@ fn run() -> Result<(), Exit> {
             _ => return Err(Exit::InputSize),
         }
         bench.codes.set(codes_of(&row));
-        for (slot, word) in timed.exchange.orders.command.iter_mut().zip(row) {
+        for (slot, word) in timed.exchange.command.command.iter_mut().zip(row) {
             *slot = word;
         }
         timed.exchange.host_alive();

@@ -192,7 +192,8 @@ fn estimated(trial: &Trial) -> Result<f64, String> {
     // A tick that is too long is refused, with its time.
     let answer: Value = serde_json::from_slice(&output.stdout).map_err(|error| format!("specgen build: {error}"))?;
     let worst = answer["result"]["measurement"]["time"]["worst"].as_f64();
-    worst.ok_or_else(|| format!("specgen build estimates no tick: {}", String::from_utf8_lossy(&output.stderr)))
+    let printed = [&output.stdout[..], &output.stderr[..]].map(String::from_utf8_lossy);
+    worst.ok_or_else(|| format!("specgen build estimates no tick: {}{}", printed[0], printed[1]))
 }
 
 /// Compares the estimate with the longest observed tick, whose times come from the same table: it must be an upper bound, but not a
