@@ -1,4 +1,4 @@
-//! The inverse dynamics of the controller beside C, in one run: `cargo bench -p specgen-tests --bench beside_c`.
+//! The inverse dynamics of the controller beside C, in one run: `cargo bench -p specgen-benches --bench beside_c`.
 //!
 //! The C is straight-line code, traced from the very kernel with the constants of the reference platform: what a code generator
 //! makes of it at best. `cc -O3` compiles it for x86-64-v2 with the operations as they are, so that its bits are the kernel's, and for

@@ -1,4 +1,4 @@
-//! Host time of the inverse dynamics: `cargo bench -p specgen-tests --bench dynamics`. Quote ratios: machines are noisy.
+//! Host time of the inverse dynamics: `cargo bench -p specgen-benches --bench dynamics`. Quote ratios: machines are noisy.
 
 use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};

@@ -1,4 +1,4 @@
-//! Host time of the kernels: `cargo bench -p specgen-tests`. Quote ratios: machines are noisy.
+//! Host time of the kernels: `cargo bench -p specgen-benches`. Quote ratios: machines are noisy.
 
 use divan::{Bencher, black_box};
 use specgen_runtime::{Everett, ReversalMemory};

@@ -1,4 +1,4 @@
-//! Host time of the controller in task space: `cargo bench -p specgen-tests --bench platform`. Quote ratios: machines are
+//! Host time of the controller in task space: `cargo bench -p specgen-benches --bench platform`. Quote ratios: machines are
 //! noisy. A whole tick is one of the emitted host library, words in and out, under the closed-loop record of the exercise;
 //! its parts are the runtime's kernels with the constants of the reference platform.
 

@@ -1,4 +1,4 @@
-//! Host time of the simulated loop: `cargo bench -p specgen-tests --bench simulation`. Quote ratios: machines are noisy.
+//! Host time of the simulated loop: `cargo bench -p specgen-benches --bench simulation`. Quote ratios: machines are noisy.
 //!
 //! Every bench simulates a quarter of a second of the reference platform at 10 kHz, or a part of that: items are simulated
 //! ticks, so that items/s over 10 000 is simulated time over real time.

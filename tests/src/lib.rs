@@ -8,6 +8,7 @@ pub mod cases;
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use std::time::Duration;
@@ -105,12 +106,12 @@ fn builds() -> PathBuf {
     repository().join("target/tests")
 }
 
-/// A compiled spec with its workspace on disk.
+/// A compiled spec, and its workspace on disk once a test asks for it.
 pub struct Emitted {
     /// The compiled spec.
     pub compiled: Arc<Compilation>,
-    /// The workspace.
-    pub dir: PathBuf,
+    name: String,
+    dir: OnceLock<PathBuf>,
 }
 
 /// Folder in which workspaces are built one after the other. Cargo identifies crates by their path, so parts shared with the last
@@ -166,7 +167,7 @@ fn files(dir: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
 }
 
 impl Emitted {
-    /// Compiles a spec of `specs/` with `edits` (old text, new text) and writes its workspace to a separate folder.
+    /// Compiles a spec of `specs/` with `edits` (old text, new text). Its workspace gets a folder of this name.
     ///
     /// # Panics
     /// If an edit finds nothing to replace, or the spec is refused.
@@ -203,15 +204,35 @@ impl Emitted {
         Self::of(name, compiled.into())
     }
 
-    /// A compiled spec with its workspace on disk.
+    /// A compiled spec.
+    #[must_use]
+    pub fn of(name: &str, compiled: Arc<Compilation>) -> Self {
+        Self { compiled, name: name.to_owned(), dir: OnceLock::new() }
+    }
+
+    /// The workspace, in a folder of its own.
     ///
     /// # Panics
     /// If it cannot be written.
     #[must_use]
-    pub fn of(name: &str, compiled: Arc<Compilation>) -> Self {
-        let dir = scratch(name);
-        workspace::write_scratch(&dir, &compiled.files).expect("an empty folder");
-        Self { compiled, dir }
+    pub fn dir(&self) -> &Path {
+        self.dir.get_or_init(|| {
+            let dir = scratch(&self.name);
+            workspace::write_scratch(&dir, &self.compiled.files()).expect("an empty folder");
+            dir
+        })
+    }
+
+    /// Checks packages of the workspace with `cargo check`; warnings are errors.
+    ///
+    /// # Panics
+    /// If cargo cannot be run.
+    #[must_use]
+    pub fn check(&self, packages: &[&str]) -> Output {
+        let stage = Stage::of(self.dir());
+        let mut cargo = Command::new(env!("CARGO"));
+        cargo.args(["check", "--quiet"]).args(packages).current_dir(&stage.folder).env("RUSTFLAGS", "-D warnings");
+        cargo.env("CARGO_TARGET_DIR", image_target().join("checked")).output().expect("cargo")
     }
 
     /// The emitted crate as a host library.
@@ -220,7 +241,7 @@ impl Emitted {
     /// If it does not build.
     #[must_use]
     pub fn library(&self) -> PathBuf {
-        let stage = Stage::of(&self.dir);
+        let stage = Stage::of(self.dir());
         target::host::build_library(&stage.folder, &image_target()).unwrap_or_else(|error| panic!("{error}"))
     }
 
@@ -249,7 +270,7 @@ impl Emitted {
     #[must_use]
     pub fn image(&self, mcu: Mcu) -> Option<Image> {
         target::found_or_skipped(target::available()).unwrap_or_else(|error| panic!("{error}"))?;
-        let stage = Stage::of(&self.dir);
+        let stage = Stage::of(self.dir());
         Some(target::build_image(&stage.folder, mcu, &image_target()).unwrap_or_else(|error| panic!("{error}")))
     }
 

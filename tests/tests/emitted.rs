@@ -41,7 +41,7 @@ fn compiled() -> &'static BTreeMap<String, Files> {
     let of = |spec: String| {
         let compiled =
             compile(&repository().join("specs").join(&spec)).unwrap_or_else(|r| panic!("{spec}: {:?}", r.findings));
-        (spec, compiled.files)
+        (spec, compiled.files())
     };
     FILES.get_or_init(|| specs().into_iter().map(of).collect())
 }
@@ -142,14 +142,7 @@ fn every_example_spec_builds_without_a_warning_and_without_a_panic_path() {
         let _ = emitted.library();
         // The other packages are copied: the same in every output.
         let packages: &[&str] = if index == 0 { &["--workspace"] } else { &["--package", "controller"] };
-        let built = Command::new(env!("CARGO"))
-            .args(["check", "--quiet"])
-            .args(packages)
-            .current_dir(&emitted.dir)
-            .env("RUSTFLAGS", "-D warnings")
-            .env("CARGO_TARGET_DIR", emitted.dir.join("target"))
-            .output()
-            .unwrap();
+        let built = emitted.check(packages);
         assert!(built.status.success(), "{spec}: {}", String::from_utf8_lossy(&built.stderr));
     }
 }
@@ -299,12 +292,12 @@ fn the_committed_controller_is_what_the_reference_spec_gives() {
 #[ignore = "long: built and searched from nothing; a stand-in with a panic path is refused in the test run"]
 fn a_panic_path_keeps_the_host_library_from_linking() {
     let emitted = Emitted::new("panics", "features/small-grid.toml", &[]);
-    let path = emitted.dir.join("runtime/src/memory.rs");
+    let path = emitted.dir().join("runtime/src/memory.rs");
     let text = fs::read_to_string(&path).unwrap();
     let line = "self.dropped = self.dropped.saturating_add(1);";
     assert!(text.contains(line));
     fs::write(&path, text.replace(line, "self.dropped = self.dropped.checked_add(1).unwrap();")).unwrap();
-    let error = specgen::target::host::build_library(&emitted.dir, &emitted.dir.join("target")).unwrap_err();
+    let error = specgen::target::host::build_library(emitted.dir(), &emitted.dir().join("target")).unwrap_err();
     assert!(matches!(error, specgen::target::TargetError::PanicPath { .. }), "{error}");
 }
 

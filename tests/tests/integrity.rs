@@ -33,7 +33,7 @@ static RUN: std::sync::Mutex<()> = std::sync::Mutex::new(());
 
 /// A program with the emitted controller in it.
 fn probe(emitted: &Emitted) -> PathBuf {
-    let folder = emitted.dir.join("probe");
+    let folder = emitted.dir().join("probe");
     fs::create_dir_all(folder.join("src")).unwrap();
     fs::write(folder.join("src/main.rs"), PROBE).unwrap();
     fs::write(folder.join("Cargo.toml"), MANIFEST).unwrap();

@@ -193,12 +193,11 @@ fn one_ulp_of_one_constant_is_found_with_tick_and_signal() {
     let bad = Emitted::new("platform-ulp-bad", "reference.toml", &[]);
     let mut files = BTreeSet::new();
     for (file, value, named) in cases {
-        // The first constant of two files, one for each kind of load; in the full run all.
-        let first = files.insert(file) && ["gauges", "body"].contains(&file);
-        if !specgen_tests::length(first, true) {
+        // The first constant of each file. Every constant is changed by an ulp in the tests of `run-time`, which builds nothing.
+        if !files.insert(file) {
             continue;
         }
-        let path = bad.dir.join(format!("controller/src/{file}.rs"));
+        let path = bad.dir().join(format!("controller/src/{file}.rs"));
         let text = fs::read_to_string(&path).unwrap();
         let spoilt = with_one_ulp(&text, value).unwrap_or_else(|| panic!("{file} has no {value:?}"));
         fs::write(&path, spoilt).unwrap();

@@ -270,13 +270,13 @@ fn settings_come_back_from_their_words() {
     let each = [("platform-words-f64", &[][..]), ("platform-words-f32", &[F32][..])];
     for (folder, edits) in each.into_iter().take(specgen_tests::length(1, 2)) {
         let emitted = Emitted::new(folder, "reference.toml", edits);
-        let tests = emitted.dir.join("controller/tests");
+        let tests = emitted.dir().join("controller/tests");
         fs::create_dir_all(&tests).expect("target is writable");
         fs::write(tests.join("words.rs"), ROUND_TRIP).expect("target is writable");
         let built = Command::new(env!("CARGO"))
             .args(["test", "--quiet", "--package", "controller", "--test", "words"])
-            .current_dir(&emitted.dir)
-            .env("CARGO_TARGET_DIR", emitted.dir.join("target"))
+            .current_dir(emitted.dir())
+            .env("CARGO_TARGET_DIR", emitted.dir().join("target"))
             .output()
             .expect("cargo");
         let text = format!("{}{}", String::from_utf8_lossy(&built.stdout), String::from_utf8_lossy(&built.stderr));

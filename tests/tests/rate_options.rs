@@ -148,7 +148,7 @@ fn creep_without_weight_moves_as_the_static_model_does() {
     let empty = "memory  = 64\nrate = \"creep\"\ncreep_times = [\"1 s\"]\ncreep_weights = [0]";
     let with = Emitted::new("rate-empty", "legs.toml", &[("memory  = 64", empty)]);
     let without = Emitted::new("rate-none", "legs.toml", &[]);
-    let text = |emitted: &Emitted| emitted.compiled.files["controller/src/hysteresis.rs"].clone();
+    let text = |emitted: &Emitted| emitted.compiled.files().remove("controller/src/hysteresis.rs").unwrap();
     assert!(text(&with).contains("Creep") && !text(&without).contains("Creep"));
     let mut traces = [&with, &without].map(|emitted| {
         let mut controller = emitted.at_run_time();

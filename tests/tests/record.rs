@@ -227,7 +227,7 @@ fn hash(words: &[u64]) -> u64 {
 /// The same ticks on the M7: outputs, digests, the words of every machine and those of every block; and what they cost.
 fn on_the_microcontroller(emitted: &Emitted, bytes: &[u8]) {
     let main = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/record_support/qemu.rs");
-    fs::copy(main, emitted.dir.join("qemu/src/main.rs")).unwrap();
+    fs::copy(main, emitted.dir().join("qemu/src/main.rs")).unwrap();
     let Some(image) = emitted.image(Mcu::Mps2An500) else { return };
     let mut machine = Supervised::new(emitted.at_run_time());
     let config = machine.controller().default_config();

@@ -102,7 +102,7 @@ fn changed_snapshots_are_refused_or_harmless(name: &str, spec: &str, edits: &[(&
     let mut loaded = course.machine.fork();
     // By how much the largest changed word was changed: the first are those nearest to a bound.
     let mut accepted: Vec<(f64, Vec<u64>)> = Vec::new();
-    let most = length(40, 1_000);
+    let most = length(40, 300);
     // Of what was changed by less there is enough.
     let mut enough = -1.0;
     let (mut refused, mut taken) = (0_u64, 0_u64);

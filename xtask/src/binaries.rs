@@ -26,11 +26,12 @@ pub struct Mode {
 /// Modules whose tests mostly wait, for time or for another process.
 const WAITING: [&str; 4] = ["cli all::rt_pc", "cli all::operate", "cli all::kills", "cli all::interrupt"];
 
-/// Packages without tests; their libraries would be compiled a second time for nothing.
-const WITHOUT_TESTS: [&str; 3] = ["controller", "controller-with-passes", "specgen-law"];
+/// Packages without tests; their libraries, or what only benchmarks depend on, would be compiled for nothing.
+const WITHOUT_TESTS: [&str; 4] = ["controller", "controller-with-passes", "specgen-law", "specgen-benches"];
 /// Packages whose own tests take seconds, but whose libraries need 7 to 54 CPU-seconds each to compile for them. They are tested
 /// only in the full run; the short run tests them through the command and across crates.
-const LONG_TO_COMPILE: [&str; 8] = [
+const LONG_TO_COMPILE: [&str; 9] = [
+    "specgen-runtime",
     "specgen-numerics",
     "specgen-run-time",
     "specgen-identify",
@@ -80,7 +81,8 @@ pub fn compile(root: &Path, full: bool) -> Result<Vec<Binary>, String> {
 /// Runs the tests, then checks what was skipped.
 pub fn test(root: &Path, binaries: &[Binary], mode: Mode, ran: &mut TestResults) -> Outcome {
     let kept = root.join("target/tests");
-    let durations = Durations::read(&kept.join("durations.json"));
+    let last = kept.join(if mode.full { "durations-full.json" } else { "durations.json" });
+    let durations = Durations::read(&last, mode.full);
     let jobs = match jobs(binaries, &durations, mode.full) {
         Ok(jobs) => jobs,
         Err(why) => return Outcome::Failed(why),
@@ -92,7 +94,7 @@ pub fn test(root: &Path, binaries: &[Binary], mode: Mode, ran: &mut TestResults)
     let begun = SystemTime::now();
     let done = run(&jobs, workers, &kept, &durations, mode);
     let builds = Builds::since(&kept.join("cache/builds"), begun);
-    Durations::of(done.iter().map(|ended| (ended.name.clone(), ended.took))).write(&kept.join("durations.json"));
+    Durations::of(done.iter().map(|ended| (ended.name.clone(), ended.took))).write(&last);
     let mut failed = Vec::new();
     for ended in done {
         if !ended.good {
@@ -324,9 +326,10 @@ mod tests {
     #[test]
     fn packages_without_tests_have_none() {
         let root = crate::root();
-        let mut open = ["firmware/controller", "firmware/board/tests/passes/controller", "firmware/law"]
-            .map(|path| root.join(path))
-            .to_vec();
+        let mut open =
+            ["firmware/controller", "firmware/board/tests/passes/controller", "firmware/law", "tests/benches"]
+                .map(|path| root.join(path))
+                .to_vec();
         assert_eq!(open.len(), WITHOUT_TESTS.len());
         let mut files = 0;
         while let Some(path) = open.pop() {

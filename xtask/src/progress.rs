@@ -9,7 +9,7 @@ use crate::run::clock;
 /// Durations of jobs, from the last run on this machine, or from the table below.
 pub struct Durations(BTreeMap<String, f64>);
 
-/// Durations of jobs of ten seconds and more, s: for the order of jobs on a machine without an earlier run.
+/// Durations of the longest jobs, s: for the order of jobs on a machine without an earlier run.
 const TABLE: &[(&str, f64)] = &[
     ("tests all::supervisor", 69.9),
     ("cli all::rt_pc", 65.0),
@@ -21,29 +21,37 @@ const TABLE: &[(&str, f64)] = &[
     ("cli all::examples", 23.3),
     ("tests all::emitted", 22.0),
     ("tests all::physical_lint", 18.0),
-    ("cli all::files", 18.0),
-    ("cli all::cli", 16.2),
-    ("cli all::guide", 15.7),
-    ("compiler all::golden", 15.0),
-    ("cli all::assumed", 13.9),
-    ("cli all::output_folder", 13.7),
-    ("compiler all::design", 12.5),
-    ("cli all::tune", 10.9),
-    ("tests all::sensing", 10.6),
-    ("cli all::report", 10.6),
-    ("compiler all", 10.2),
-    ("cli all::records", 10.1),
-    ("cli all::interrupt", 10.1),
-    ("cli all::kills", 10.0),
+];
+/// The same for the full run.
+const FULL: &[(&str, f64)] = &[
+    ("tests all::platform_tables", 700.0),
+    ("cli all::rt_pc", 400.0),
+    ("tests all::run_time", 320.0),
+    ("tests all::physical_lint", 250.0),
+    ("tests all::platform_bits", 230.0),
+    ("tests all::supervisor", 220.0),
+    ("studies::learning", 220.0),
+    ("tests all::identify_leg_models", 180.0),
+    ("cli all::kills", 160.0),
+    ("compiler all::golden", 135.0),
+    ("run-time::tests", 130.0),
+    ("cli all::examples", 130.0),
+    ("tests all::boards", 130.0),
+    ("tests all::emitted", 110.0),
+    ("cli all::findings", 110.0),
+    ("cli all::fmu", 110.0),
+    ("runtime all::dac_exact", 110.0),
+    ("cli all::robust", 100.0),
 ];
 /// Duration of other jobs, s.
 const OTHERS: f64 = 1.0;
 
 impl Durations {
-    /// Durations of the last run, or those of the table.
-    pub fn read(path: &Path) -> Self {
+    /// Durations of the last run, or those of a table.
+    pub fn read(path: &Path, full: bool) -> Self {
         let last = std::fs::read(path).ok().and_then(|bytes| serde_json::from_slice(&bytes).ok());
-        Self(last.unwrap_or_else(|| TABLE.iter().map(|(name, seconds)| ((*name).to_owned(), *seconds)).collect()))
+        let table = if full { FULL } else { TABLE };
+        Self(last.unwrap_or_else(|| table.iter().map(|(name, seconds)| ((*name).to_owned(), *seconds)).collect()))
     }
 
     pub fn of(jobs: impl Iterator<Item = (String, Duration)>) -> Self {
@@ -120,11 +128,11 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("durations.json");
         Durations::of([("a".to_owned(), Duration::from_secs(7))].into_iter()).write(&path);
-        assert_eq!(Durations::read(&path).expect("a"), Duration::from_secs(7));
-        assert_eq!(Durations::read(&path).expect("b"), Duration::from_secs(1));
+        assert_eq!(Durations::read(&path, false).expect("a"), Duration::from_secs(7));
+        assert_eq!(Durations::read(&path, false).expect("b"), Duration::from_secs(1));
         std::fs::write(&path, "{\"a\": -1.0}").unwrap();
-        assert_eq!(Durations::read(&path).expect("a"), Duration::from_secs(1));
+        assert_eq!(Durations::read(&path, false).expect("a"), Duration::from_secs(1));
         std::fs::write(&path, "no").unwrap();
-        assert_eq!(Durations::read(&path).expect("a"), Duration::from_secs(1));
+        assert_eq!(Durations::read(&path, false).expect("a"), Duration::from_secs(1));
     }
 }

@@ -130,7 +130,7 @@ fn aimed(way: Way, rounds: usize, random: &mut ChaCha8Rng) -> usize {
 fn a_kill_while_a_folder_is_written_leaves_the_old_one_or_the_new_one() {
     let mut random = ChaCha8Rng::seed_from_u64(14);
     for way in [Way::Swap, Way::InPlace] {
-        let rounds = length(4, 40);
+        let rounds = length(4, 16);
         let hits = aimed(way, rounds, &mut random);
         println!("{way:?}: {rounds} kills, {hits} in the midst of writing; every next run succeeded");
         assert!(hits > 0, "{way:?}: no kill came in time");
@@ -139,7 +139,7 @@ fn a_kill_while_a_folder_is_written_leaves_the_old_one_or_the_new_one() {
 
 /// Kills each of these commands at random times.
 #[test]
-#[ignore = "long: 120 kills at random times"]
+#[ignore = "long: 48 kills at random times"]
 fn every_run_after_a_kill_succeeds() {
     let mut random = ChaCha8Rng::seed_from_u64(200);
     let output = Output::new();
@@ -162,7 +162,7 @@ fn every_run_after_a_kill_succeeds() {
         };
         run("first");
         let took = run("second");
-        let (rounds, mut killed) = (30, 0);
+        let (rounds, mut killed) = (12, 0);
         for round in 0..rounds {
             let what = format!("{arguments:?}, round {round}");
             folder.write("legs.toml", &spec);

@@ -62,7 +62,7 @@ fn supervised(folder: &Path) -> Supervised {
 /// Writes the workspace of six legs, and builds its image if `image`.
 fn built(folder: &Path, image: bool) -> Option<Image> {
     let compiled = specgen::compile::compile(Path::new(&spec("legs.toml"))).unwrap();
-    drop(specgen::workspace::write(folder, &compiled.files).unwrap());
+    drop(specgen::workspace::write(folder, &compiled.files()).unwrap());
     image.then(|| target::build_pil(folder, Mcu::Mps2An500, &folder.join("target")).unwrap())
 }
 

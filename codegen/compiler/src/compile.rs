@@ -1,4 +1,4 @@
-//! The compiler as one function: spec file to the files of a workspace. Touches no output.
+//! The compiler as one function: spec file to the constants of a controller. [`Compilation::files`] emits the workspace.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -50,13 +50,18 @@ pub struct Compilation {
     pub assumptions: Assumptions,
     /// Every constant of the controller.
     pub ir: Ir,
-    /// Files of the workspace: path, text.
-    pub files: BTreeMap<String, String>,
     /// Warnings and notes.
     pub findings: Vec<Diagnostic>,
 }
 
 impl Compilation {
+    /// Emits the workspace, with the program of the spec's board if it has one: path, text. Most commands need no text.
+    #[must_use]
+    pub fn files(&self) -> BTreeMap<String, String> {
+        let target = Target::of(self.model.target.mcu);
+        workspace::files_with(&self.ir, &emit::emit(&self.ir), &[target.name])
+    }
+
     /// Requirements that the spec does not meet although it compiles. `check` and `build` report them as errors; a simulation
     /// still runs.
     #[must_use]
@@ -65,7 +70,7 @@ impl Compilation {
     }
 }
 
-/// All phases except writing: read, check, identify, lower, emit.
+/// All phases before the text: read, check, identify, lower.
 ///
 /// # Errors
 /// The spec or a record is refused. Later phases run only if earlier ones accept, so a second run may find more.
@@ -113,9 +118,6 @@ fn phases(source: &SpecSource, findings: &mut Vec<Diagnostic>) -> Option<Compila
         accepted(lower::lower(&model, task, &records.tables, &records.rate_tables, &records.around, origin), findings)?;
     let pose_noise = accepted(lower::pose_noise(&model), findings)?;
     let rest_noise = accepted(rest::noise(&model, design.as_ref()), findings)?;
-    // Includes the program of the spec's board, if it has one.
-    let target = Target::of(model.target.mcu);
-    let files = workspace::files_with(&ir, &emit::emit(&ir), &[target.name]);
     lint::allow(&model, findings);
     findings.extend(lint::unused(&model, findings));
     debug_assert!(findings.iter().all(|finding| finding.severity < Severity::Error));
@@ -132,7 +134,6 @@ fn phases(source: &SpecSource, findings: &mut Vec<Diagnostic>) -> Option<Compila
         rest_noise,
         assumptions,
         ir,
-        files,
         findings: Vec::new(),
     })
 }

@@ -18,6 +18,7 @@
 //! | [`Loci`] | stability boundary of a loop of six modes over structural modes |
 //! | [`steady_covariances`] | steady-state covariance of a sampled system under white noise |
 //! | [`fft`] | Fourier transforms |
+//! | [`complex6`] | complex 6×6 matrices |
 //! | [`nyquist`] | sensitivity and stability of a loop of one signal |
 //! | [`Kernels`], [`displacements`], [`leg_forces`], [`mass_matrix`] and others | the controller's kernels on these numbers, compiled here |
 //!
@@ -25,6 +26,7 @@
 
 mod cholesky;
 mod cma;
+pub mod complex6;
 mod covariance;
 mod double;
 mod eigenvalues;

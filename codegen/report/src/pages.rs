@@ -315,7 +315,7 @@ fn build(compiled: &Compilation, no_target: bool, ui: &Ui) -> Result<Build, Fail
     let mut controller = if no_target {
         at_run_time(compiled, ui)?
     } else {
-        workspace::write_scratch(&folder, &compiled.files)?;
+        workspace::write_scratch(&folder, &compiled.files())?;
         ui.runs(ControllerForm::Emitted);
         ui.progress("building the emitted controller for this host");
         Controller::load(&target::host::build_loadable(&folder, &cache)?).map_err(environment)?

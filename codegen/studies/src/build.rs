@@ -94,12 +94,11 @@ pub fn run(options: &Options, ui: &mut Ui) -> Result<(), Failure> {
         .as_deref()
         .map_or_else(|| PathBuf::from(format!("{}-controller", compiled.ir.name)), Path::to_owned);
     let with_board = || workspace::files_with(&compiled.ir, &specgen_compiler::emit::emit(&compiled.ir), &["board"]);
-    let files = if options.board { with_board() } else { compiled.files.clone() };
+    let files = if options.board { with_board() } else { compiled.files() };
     let _hold = workspace::write(&output, &files)?;
     ui.progress(&format!("wrote {} files to {}", files.len(), output.display()));
 
-    let mut summary = Summary::of(&compiled, &output, options.details);
-    summary.files = files.len();
+    let mut summary = Summary::of(&compiled, &output, files.len(), options.details);
     // The workspace is complete, whatever fails below.
     let built = if options.no_build {
         summary.missing = Some("not built: --no-build".to_owned());
@@ -166,14 +165,14 @@ fn build(compiled: &Compilation, output: &Path, summary: &mut Summary, ui: &Ui) 
 }
 
 impl Summary {
-    fn of(compiled: &Compilation, output: &Path, details: bool) -> Self {
+    fn of(compiled: &Compilation, output: &Path, files: usize, details: bool) -> Self {
         let hysteresis = &compiled.ir.hysteresis;
         let nodes: usize = hysteresis.tables.iter().map(Vec::len).sum();
         Self {
             name: compiled.ir.name.clone(),
             digest: compiled.ir.digest.clone(),
             output: output.display().to_string(),
-            files: compiled.files.len(),
+            files,
             tables: hysteresis.tables.len(),
             table_bytes: nodes * compiled.ir.scalar.bits() as usize / 8,
             host_library: None,

@@ -58,7 +58,7 @@ pub fn at_run_time(compiled: &Compilation, ui: &Ui) -> Result<Controller, Failur
 fn emitted(compiled: &Compilation, ui: &Ui) -> Result<Controller, Failure> {
     let scratch = Scratch::new().map_err(environment)?;
     let workspace = scratch.path().join("controller");
-    workspace::write_scratch(&workspace, &compiled.files)?;
+    workspace::write_scratch(&workspace, &compiled.files())?;
     ui.runs(ControllerForm::Emitted);
     ui.progress("controller: emitted code, built for this host");
     let library = build_loadable(&workspace, &scratch.path().join("target"))?;

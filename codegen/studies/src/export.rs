@@ -83,7 +83,7 @@ fn export(
     let _claimed = claim(output)?;
     let scratch = Scratch::new().map_err(environment)?;
     let folder = scratch.path().join("controller");
-    workspace::write_scratch(&folder, &compiled.files)?;
+    workspace::write_scratch(&folder, &compiled.files())?;
     ui.runs(ControllerForm::Emitted);
     ui.progress("building the emitted controller for this host");
     let library = build_loadable(&folder, &scratch.path().join("target"))?;

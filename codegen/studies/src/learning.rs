@@ -13,7 +13,6 @@ mod coherence;
 mod convergence;
 mod excitation;
 mod gain;
-mod matrix;
 mod modes;
 mod motion;
 mod observation;

@@ -23,7 +23,7 @@ const BLOCK: usize = 8192;
 
 /// Ticks of each run of a law alone; a machine runs for some times as many.
 fn ticks() -> usize {
-    length(2_500, 20_000)
+    length(2_500, 7_000)
 }
 
 /// Ticks of a machine in a trial of so many ticks of the law.

@@ -1,4 +1,4 @@
-//! Any bits in every input word: 25,000 ticks of each kind, and 50 million in the full run.
+//! Any bits in every input word: 25,000 ticks of each kind, and 15 million in the full run.
 
 use super::bench::*;
 use host_sim::controller::Supervised;
@@ -6,7 +6,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 
 fn ticks() -> u64 {
-    specgen_tests::length(25_000, 50_000_000)
+    specgen_tests::length(25_000, 15_000_000)
 }
 
 fn fuzz(kind: Kind, more: &[(&str, &str)], name: &str) {

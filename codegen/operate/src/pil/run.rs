@@ -45,7 +45,7 @@ pub fn run(
 
     let own = PathBuf::from(format!("{}-controller", compiled.ir.name));
     let output = options.output.unwrap_or(&own).to_owned();
-    let hold = workspace::write(&output, &compiled.files)?;
+    let hold = workspace::write(&output, &compiled.files())?;
     let target_dir = output.join("target");
     ui.runs(ControllerForm::Emitted);
     ui.progress(&format!("building the host library in {}", output.display()));

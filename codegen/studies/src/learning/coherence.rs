@@ -8,7 +8,7 @@
 //! ```
 //! The first term learns what exceeds the noise. The second averages: it replaces noise that was learned before by the mean over the passes.
 
-use super::matrix::larger;
+use specgen_numerics::complex6::larger;
 use specgen_numerics::fft::Complex64;
 
 /// Bins with power up to this multiple of the noise count as noise.

@@ -11,9 +11,9 @@ use specgen_compiler::stability::platform::{
 use specgen_numerics::nyquist::{Complex, Flexure, over, plus, square, times};
 use specgen_runtime::{ControlMode, Law};
 
-use super::matrix::{Matrix6c, inverse, larger, left, multiply, norm, spectral_radius};
 use super::response::Response;
 use crate::factors::{Factor, Factors};
+use specgen_numerics::complex6::{Matrix6c, inverse, larger, left, multiply, norm, spectral_radius};
 
 /// Largest permitted spectral radius of Q (I − T L): the error of a pass relative to that of the pass before.
 pub const LARGEST_RADIUS: f64 = 0.9;

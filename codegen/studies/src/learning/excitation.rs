@@ -16,12 +16,12 @@ use specgen_numerics::nyquist::{Complex, plus, times};
 use specgen_runtime::playback::Knot;
 
 use super::convergence::{Learnable, spacing};
-use super::matrix::{Matrix6c, inverse, multiply};
 use super::motion::Motion;
 use super::passes::{LearnError, ONSET, RepeatableMachine, followed, given, unlimited};
 use super::response::{Bin, Response};
 use super::table::knots;
 use super::update::{kept, mapped};
+use specgen_numerics::complex6::{Matrix6c, inverse, multiply};
 
 /// A conference matrix: orthogonal rows of signs with one zero each.
 const CONFERENCE: [[i8; 6]; 6] = [

@@ -6,8 +6,8 @@ use serde::Serialize;
 use specgen_numerics::nyquist::square;
 
 use super::convergence::Learnable;
-use super::matrix::Matrix6c;
 use super::response::Response;
+use specgen_numerics::complex6::Matrix6c;
 
 /// Measured response of a mode.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]

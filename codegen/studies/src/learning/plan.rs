@@ -9,10 +9,10 @@ use specgen_runtime::learning::{HEAD, Learning, Settings, plan_rows};
 use specgen_runtime::playback::Knot;
 
 use super::convergence::{Convergence, LARGEST_RADIUS, Learnable};
-use super::matrix::{Matrix6c, spectral_radius};
 use super::motion::Motion;
 use super::update::FADE;
 use crate::factors::Factors;
+use specgen_numerics::complex6::{Matrix6c, spectral_radius};
 
 /// Longest response to each side, in knots: the feedback deals with anything slower.
 const REACH: usize = 512;

@@ -6,8 +6,8 @@ use serde::{Deserialize, Serialize};
 use specgen_language::files;
 use specgen_numerics::nyquist::square;
 
-use super::matrix::{Matrix6c, inverse, multiply, spectral_radius};
 use super::table::TableError;
+use specgen_numerics::complex6::{Matrix6c, inverse, multiply, spectral_radius};
 
 /// Format and version of the file.
 const FORMAT: &str = "specgen response 1";

@@ -14,11 +14,12 @@ use serde::Serialize;
 use specgen_compiler::compile::Compilation;
 use specgen_identify::Parameter;
 use specgen_language::model::{self as language, StructuralKind};
+use specgen_numerics::complex6::sum;
 use specgen_numerics::nyquist::{Complex, over, plus, square, times};
 
 use super::convergence::Learnable;
 use super::response::Bin;
-use fit::{Domain, Fit, Problem, RATIO, Resonance, sum};
+use fit::{Domain, Fit, Problem, RATIO, Resonance};
 
 mod fit;
 

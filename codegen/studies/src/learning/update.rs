@@ -7,9 +7,9 @@ use specgen_numerics::fft::{self, Complex64, Fft};
 
 use super::coherence::Coherence;
 use super::convergence::{Convergence, Learnable, highest, low_pass};
-use super::matrix::{Matrix6c, inverse};
 use super::motion::Motion;
 use specgen_numerics::Matrix6;
+use specgen_numerics::complex6::{Matrix6c, inverse};
 
 /// Fade-in and fade-out time of a correction, s.
 pub(super) const FADE: [f64; 2] = [5e-3, 20e-3];

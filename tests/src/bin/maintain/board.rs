@@ -23,10 +23,10 @@ use xtask::setup;
 /// Its own workspace.
 pub const MANIFEST: &str = "tests/board/Cargo.toml";
 /// A package that a run needs, as arguments of cargo.
-type Package = [&'static str; 2];
-const TOOL: Package = ["--manifest-path", MANIFEST];
-/// Built alone: its dependencies have other features than in the test build, so it is compiled again.
-const SPECGEN: Package = ["--package", "specgen"];
+type Package = &'static [&'static str];
+const TOOL: Package = &["--manifest-path", MANIFEST];
+/// Together with the tests: alone, its dependencies would have other features than in their build, and be compiled again.
+const SPECGEN: Package = &["--package", "specgen", "--package", "specgen-tests", "--bin", "specgen"];
 /// Folder in which `tests/tests/boards.rs` keeps image and spec of each target.
 const TESTED: &str = "target/tests/boards";
 /// End of the record of a played motion, s after its command: rest and knots take half a second, then it moves.
@@ -104,7 +104,7 @@ fn tested(root: &Path, with_faults: bool) -> ExitCode {
 
 /// The tests of the models of a board's parts.
 fn models(root: &Path) -> Outcome {
-    let mut test = cargo(root, &[&["test", "--release", "--quiet", "--locked"], &TOOL[..]].concat());
+    let mut test = cargo(root, &[&["test", "--release", "--quiet", "--locked"], TOOL].concat());
     test.arg("--target-dir").arg(built_in(root));
     expect_success(test, "see the test above")
 }
@@ -157,7 +157,7 @@ fn built(root: &Path, packages: &[Package]) -> Outcome {
         return setup::missing(format!("{error}"));
     }
     for package in packages {
-        let mut build = cargo(root, &[&["build", "--release", "--quiet", "--locked"], &package[..]].concat());
+        let mut build = cargo(root, &[&["build", "--release", "--quiet", "--locked"], package].concat());
         // The same folder for both: the dependencies of the tool are in the workspace's.
         build.arg("--target-dir").arg(built_in(root));
         let outcome = expect_success(build, "see above");

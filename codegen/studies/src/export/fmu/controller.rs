@@ -18,7 +18,8 @@ pub(super) fn built(compiled: &Compilation, ui: &Ui) -> Result<PackedUnit, Failu
     let scratch = Scratch::new().map_err(environment)?;
     let sources = scratch.path().join("sources");
     let rust = sources.join("rust");
-    workspace::write_scratch(&rust, &compiled.files)?;
+    let files = compiled.files();
+    workspace::write_scratch(&rust, &files)?;
     ui.runs(ControllerForm::Emitted);
     ui.progress("building the emitted controller for this host");
     let target = scratch.path().join("target");
@@ -29,7 +30,7 @@ pub(super) fn built(compiled: &Compilation, ui: &Ui) -> Result<PackedUnit, Failu
     let own = [("controller.h", header(&machine)), ("model.h", MODEL.to_owned()), ("fmu.h", unit.header(""))];
     let own = unit.write_sources(&sources, own, ("host", "libcontroller_host.a", ""))?;
     let binary = build_unit(&sources, &rust.join("host"), &target, &unit.identifier)?;
-    let rust = compiled.files.iter().map(|(name, text)| (format!("rust/{name}"), text.clone()));
+    let rust = files.into_iter().map(|(name, text)| (format!("rust/{name}"), text));
     unit.packed(&binary, own.into_iter().chain(rust))
 }
 

@@ -90,8 +90,8 @@ fn rust(compiled: &Compilation) -> Result<BTreeMap<String, String>, Failure> {
         // The runtime is a sibling of the simulator here, not its parent.
         *manifest = manifest.replace("path = \"..\"", "path = \"../host-sim\"");
     }
-    let runtime = compiled.files.iter().filter(|(name, _)| name.starts_with("runtime/"));
-    files.extend(runtime.map(|(name, text)| (format!("firmware/{name}"), text.clone())));
+    let runtime = compiled.files().into_iter().filter(|(name, _)| name.starts_with("runtime/"));
+    files.extend(runtime.map(|(name, text)| (format!("firmware/{name}"), text)));
     let mut manifest: DocumentMut = MANIFEST.parse().map_err(environment)?;
     if let Some(workspace) = manifest["workspace"].as_table_mut() {
         workspace.insert("members", toml_edit::value(MEMBERS.into_iter().collect::<Array>()));

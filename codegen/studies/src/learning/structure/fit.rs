@@ -6,11 +6,11 @@ use nalgebra::{Cholesky, DMatrix, DVector};
 use specgen_compiler::compile::Compilation;
 use specgen_compiler::lower::{leg_jacobian, poses_per_reading};
 use specgen_identify::Parameter;
-use specgen_numerics::nyquist::{Complex, Flexure, over, plus, square, times};
+use specgen_numerics::complex6::{Matrix6c, add_product, dot, inverse, left, multiply, sum, weighted};
+use specgen_numerics::nyquist::{Complex, Flexure, over, square, times};
 use specgen_numerics::{Matrix6, multiply6};
 
 use super::super::convergence::Learnable;
-use super::super::matrix::{Matrix6c, inverse, left, multiply};
 use super::super::response::Bin;
 use super::{Location, StructuralMode};
 
@@ -455,38 +455,6 @@ fn column(matrix: &Matrix6c, k: usize) -> [Complex; 6] {
     std::array::from_fn(|i| matrix[i][k])
 }
 
-/// a + factor b.
-pub(super) fn sum(a: &Matrix6c, b: &Matrix6c, factor: f64) -> Matrix6c {
-    std::array::from_fn(|i| std::array::from_fn(|j| plus(a[i][j], b[i][j].map(|part| factor * part))))
-}
-
-fn add_product(to: &mut Matrix6c, factor: Complex, column: &[Complex; 6], row: &[Complex; 6]) {
-    for (to, value) in to.iter_mut().zip(column) {
-        let value = times(factor, *value);
-        for (to, other) in to.iter_mut().zip(row) {
-            *to = plus(*to, times(value, *other));
-        }
-    }
-}
-
 fn each(value: impl Fn(usize, usize) -> f64) -> [[f64; 6]; 6] {
     std::array::from_fn(|i| std::array::from_fn(|j| value(i, j)))
-}
-
-/// In eight sums, which the compiler turns into vector instructions.
-fn dot(a: &[f64; 72], b: &[f64; 72]) -> f64 {
-    let mut sums = [0.0; 8];
-    for (a, b) in a.chunks_exact(8).zip(b.chunks_exact(8)) {
-        for (sum, (a, b)) in sums.iter_mut().zip(a.iter().zip(b)) {
-            *sum += a * b;
-        }
-    }
-    sums.iter().sum()
-}
-
-fn weighted(weights: &[[f64; 6]; 6], matrix: &Matrix6c) -> [f64; 72] {
-    std::array::from_fn(|k| {
-        let (i, j) = (k / 12, k / 2 % 6);
-        weights[i][j] * matrix[i][j][k % 2]
-    })
 }

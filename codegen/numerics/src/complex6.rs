@@ -1,26 +1,30 @@
 //! Complex 6×6 matrices.
 
-use specgen_numerics::nyquist::{Complex, over, plus, square, times};
+use crate::nyquist::{Complex, over, plus, square, times};
 
 /// Number of squarings for the bound of the spectral radius: ‖M³²‖^(1/32).
 const SQUARINGS: i32 = 5;
 
 /// A complex 6×6 matrix.
-pub(super) type Matrix6c = [[Complex; 6]; 6];
+pub type Matrix6c = [[Complex; 6]; 6];
 
 /// I − share · product.
-pub(super) fn left(product: &Matrix6c, share: f64) -> Matrix6c {
+#[must_use]
+pub fn left(product: &Matrix6c, share: f64) -> Matrix6c {
     std::array::from_fn(|i| {
         std::array::from_fn(|j| [f64::from(i == j) - share * product[i][j][0], -share * product[i][j][1]])
     })
 }
 
-pub(super) fn multiply(a: &Matrix6c, b: &Matrix6c) -> Matrix6c {
+/// a b.
+#[must_use]
+pub fn multiply(a: &Matrix6c, b: &Matrix6c) -> Matrix6c {
     std::array::from_fn(|i| std::array::from_fn(|j| (0..6).fold([0.0; 2], |sum, k| plus(sum, times(a[i][k], b[k][j])))))
 }
 
 /// A close upper bound of the spectral radius: ‖M^n‖^(1/n).
-pub(super) fn spectral_radius(matrix: &Matrix6c) -> f64 {
+#[must_use]
+pub fn spectral_radius(matrix: &Matrix6c) -> f64 {
     let mut power = *matrix;
     let mut scale = 0.0;
     for _ in 0..SQUARINGS {
@@ -37,18 +41,21 @@ pub(super) fn spectral_radius(matrix: &Matrix6c) -> f64 {
 }
 
 /// Largest row sum of magnitudes.
-pub(super) fn norm(matrix: &Matrix6c) -> f64 {
+#[must_use]
+pub fn norm(matrix: &Matrix6c) -> f64 {
     let sums = matrix.iter().map(|row| row.iter().map(|value| libm::sqrt(square(*value))).sum::<f64>());
     sums.fold(0.0, larger)
 }
 
 /// The larger of two; NaN if either is.
-pub(super) fn larger(a: f64, b: f64) -> f64 {
+#[must_use]
+pub fn larger(a: f64, b: f64) -> f64 {
     if a.is_nan() || b <= a { a } else { b }
 }
 
 /// The inverse by elimination with row pivots; not finite for a singular matrix.
-pub(super) fn inverse(matrix: &Matrix6c) -> Matrix6c {
+#[must_use]
+pub fn inverse(matrix: &Matrix6c) -> Matrix6c {
     let mut a = *matrix;
     let mut b: Matrix6c = std::array::from_fn(|i| std::array::from_fn(|j| [f64::from(i == j), 0.0]));
     for k in 0..6 {
@@ -65,6 +72,44 @@ pub(super) fn inverse(matrix: &Matrix6c) -> Matrix6c {
         }
     }
     b
+}
+
+/// a + factor · b.
+#[must_use]
+pub fn sum(a: &Matrix6c, b: &Matrix6c, factor: f64) -> Matrix6c {
+    std::array::from_fn(|i| std::array::from_fn(|j| plus(a[i][j], b[i][j].map(|part| factor * part))))
+}
+
+/// Adds factor · column · row.
+pub fn add_product(to: &mut Matrix6c, factor: Complex, column: &[Complex; 6], row: &[Complex; 6]) {
+    for (to, value) in to.iter_mut().zip(column) {
+        let value = times(factor, *value);
+        for (to, other) in to.iter_mut().zip(row) {
+            *to = plus(*to, times(value, *other));
+        }
+    }
+}
+
+/// The numbers of a matrix by row, Re before Im, each times the weight of its entry.
+#[must_use]
+pub fn weighted(weights: &[[f64; 6]; 6], matrix: &Matrix6c) -> [f64; 72] {
+    std::array::from_fn(|k| {
+        let (i, j) = (k / 12, k / 2 % 6);
+        weights[i][j] * matrix[i][j][k % 2]
+    })
+}
+
+/// Scalar product, in eight sums, which the compiler turns into vector instructions here.
+#[inline(never)]
+#[must_use]
+pub fn dot(a: &[f64; 72], b: &[f64; 72]) -> f64 {
+    let mut sums = [0.0; 8];
+    for (a, b) in a.chunks_exact(8).zip(b.chunks_exact(8)) {
+        for (sum, (a, b)) in sums.iter_mut().zip(a.iter().zip(b)) {
+            *sum += a * b;
+        }
+    }
+    sums.iter().sum()
 }
 
 #[cfg(test)]
