@@ -83,22 +83,31 @@ fn feed_forward(hysteresis: &ir::Hysteresis, frequency: f64, ticks: usize) -> Ve
     let table = CreepEverett { still: Everett::<f64, GRID, NODES> { nodes }, creep };
     let mut memory = CreepMemory::<f64, 64, TERMS>::new();
     let (ticks_ahead, limit) = hysteresis.lead.as_ref().map_or((0.0, 0.0), |lead| (lead.ticks, lead.limit));
-    let bend = hysteresis.lead.as_ref().and_then(|lead| lead.bend).unwrap_or(0.0);
-    let (mut before, mut last) = (0.0, 0.0);
+    let resonance = hysteresis.lead.as_ref().and_then(|lead| lead.resonance.clone());
+    let (mut before, mut last, mut turn) = (0.0, 0.0, 0.0);
     (1..=ticks)
         .map(|n| {
             let demand = demand(frequency, n as f64 * PERIOD);
             let change = demand - before;
-            let lead = (change * ticks_ahead + (change - last) * bend).clamp(-limit, limit);
-            (before, last) = (demand, change);
-            let drive = memory.solve(&table, demand + lead).clamp(0.0, GRID as f64);
+            let mut lead = change * ticks_ahead;
+            if let Some(resonance) = &resonance {
+                if (before - turn) * change < 0.0 {
+                    turn = before;
+                }
+                let of_drive = change / (1.0 + resonance.gain_growth * (demand - turn).abs());
+                lead += of_drive * resonance.lag + (of_drive - last) * resonance.bend;
+                last = of_drive;
+            }
+            before = demand;
+            let drive = memory.solve(&table, demand + lead.clamp(-limit, limit)).clamp(0.0, GRID as f64);
             memory.apply(&table, drive);
             memory.drive() * (RANGE[1] - RANGE[0]) / GRID as f64
         })
         .collect()
 }
 
-/// Error of the last cycles after one offset and one line, rms in % of the set-point's range.
+/// Error of the last cycles after one offset and one line, rms in % of the set-point's range. Each is the mean of a tick: the held
+/// voltage is a staircase, which no feed-forward changes (0.2 % rms at 100 Hz).
 fn residual(plant: &RateModel, hysteresis: &ir::Hysteresis, frequency: f64) -> f64 {
     let cycles = if frequency < 10.0 { 2.0 } else { 8.0 };
     let ticks = ((0.1 + 2.0 * cycles / frequency) / PERIOD) as usize;
@@ -106,12 +115,17 @@ fn residual(plant: &RateModel, hysteresis: &ir::Hysteresis, frequency: f64) -> f
     let step = PERIOD / FINE as f64;
     let mut text = String::from("time_s,monitor_V\n");
     for k in 0..ticks * FINE {
-        writeln!(text, "{:?},{:?}", k as f64 * step, RANGE[0] + voltages[k / FINE]).unwrap();
+        // The middle of each step: the first and the last of a tick are equally far from its ends.
+        writeln!(text, "{:?},{:?}", (k as f64 + 0.5) * step, RANGE[0] + voltages[k / FINE]).unwrap();
     }
     let run = predict(plant, &read_drive(Input::Text(&text), "plant").unwrap()).unwrap();
     let from = 0.1 + cycles / frequency;
-    let late = run.time.iter().zip(&run.displacement).filter(|(t, _)| **t >= from);
-    let errors: Vec<[f64; 2]> = late.map(|(t, y)| [t - from, y - demand(frequency, *t)]).collect();
+    let late: Vec<(&f64, &f64)> = run.time.iter().zip(&run.displacement).filter(|(t, _)| **t >= from).collect();
+    let whole = late.chunks_exact(FINE).map(|tick| {
+        let sum = |of: &dyn Fn(&(&f64, &f64)) -> f64| tick.iter().map(of).sum::<f64>() / FINE as f64;
+        [sum(&|(t, _)| **t - from), sum(&|(t, y)| **y - demand(frequency, **t))]
+    });
+    let errors: Vec<[f64; 2]> = whole.collect();
     let mean = |of: &dyn Fn(&[f64; 2]) -> f64| errors.iter().map(of).sum::<f64>() / errors.len() as f64;
     let (middle, level) = (mean(&|e| e[0]), mean(&|e| e[1]));
     let slope = mean(&|e| (e[0] - middle) * (e[1] - level)) / mean(&|e| (e[0] - middle) * (e[0] - middle));
@@ -147,18 +161,28 @@ fn the_feed_forward_leaves_little_of_a_sine_and_no_other_dead_time_leaves_less_a
             of_dead_time.push(left);
         }
     }
-    // The proposed model: with the inverse of the mode.
-    let compensated = {
-        let mut plant = model(fine, RateOption::CreepMode).clone();
-        plant.dead_time -= found.report.held;
-        let hysteresis = lowered(&found, RateOption::CreepMode, 0.0);
+    // The proposed model: with the inverse of the mode, from differences of the voltage; and from those of the demand.
+    let mut plant = model(fine, RateOption::CreepMode).clone();
+    plant.dead_time -= found.report.held;
+    let hysteresis = lowered(&found, RateOption::CreepMode, 0.0);
+    let compensated = frequencies.map(|frequency| residual(&plant, &hysteresis, frequency));
+    println!("with the mode compensated: {compensated:.3?} %");
+    let of_demand = {
+        let mode = model(&found, RateOption::CreepMode);
+        let share = mode.inertia.unwrap().gain / mode.still.mean_gain();
+        let mut hysteresis = hysteresis;
+        let resonance = hysteresis.lead.as_mut().unwrap().resonance.as_mut().unwrap();
+        *resonance = ir::Resonance { lag: share * resonance.lag, bend: share * resonance.bend, gain_growth: 0.0 };
         frequencies.map(|frequency| residual(&plant, &hysteresis, frequency))
     };
-    println!("with the mode compensated: {compensated:.3?} %");
+    println!("the same from the demand: {of_demand:.3?} %");
     let [earlier, proposed, later] = [0, 2, 4].map(|k| of_dead_time[k]);
     // Half a period more or less is worse where the dead time matters.
     assert!((2..4).all(|k| proposed[k] < earlier[k] && proposed[k] < later[k]));
-    assert!(compensated[3] < 0.5 * proposed[3], "{compensated:?} {proposed:?}");
+    // Creep that is fitted without the mode takes over part of it: at 100 Hz the gain is less than at 50 Hz.
+    assert!((0..4).all(|k| compensated[k] < 0.8 * proposed[k]), "{compensated:?} {proposed:?}");
+    // Differences of the demand leave the ring that each turn of the voltage excites.
+    assert!((2..4).all(|k| compensated[k] < 0.8 * of_demand[k]), "{compensated:?} {of_demand:?}");
     // The slowest is of creep alone: 0.12 % was asked for.
     for (left, bar) in proposed.iter().zip([0.2, 0.2, 0.35, 0.6]) {
         assert!(*left <= bar, "{proposed:?}");

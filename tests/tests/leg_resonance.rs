@@ -37,9 +37,15 @@ fn a_leg_without_the_key_has_no_lead_and_one_with_it_the_inverse_of_its_mode() {
     let bent = compiled("resonance-given", &format!("damping_ratio = 0.1\nresonance_gain = {share}"));
     let lead = bent.hysteresis.lead.as_ref().unwrap();
     let angle = TAU * RESONANCE * PERIOD;
-    assert!((lead.ticks / (share * 2.0 * DAMPING / angle) - 1.0).abs() < 1e-12, "{lead:?}");
-    assert!((lead.bend.unwrap() / (share / angle.powi(2)) - 1.0).abs() < 1e-12, "{lead:?}");
-    // 20 µm at 60 Hz behind a smooth start: q + k (2ζ/ω q̇ + q̈/ω²) as the set-point of a leg without the key.
+    let resonance = lead.resonance.as_ref().unwrap();
+    assert_eq!(lead.ticks, 0.0);
+    assert!((resonance.lag / (2.0 * DAMPING / angle) - 1.0).abs() < 1e-12, "{lead:?}");
+    assert!((resonance.bend * angle.powi(2) - 1.0).abs() < 1e-12, "{lead:?}");
+    // The gain of a large loop is reached halfway.
+    let grid = bent.hysteresis.grid;
+    let travel = bent.hysteresis.tables[0][grid * (grid + 1) / 2];
+    assert!((resonance.gain_growth * 0.5 * travel / (1.0 / share - 1.0) - 1.0).abs() < 1e-12, "{lead:?}");
+    // 20 µm at 60 Hz behind a smooth start: q + k_s (2ζ/ω u̇ + ü/ω²) as the set-point of a leg without the key.
     let demand: Vec<f64> = (0..1000)
         .map(|n| {
             let t = f64::from(n) * PERIOD;
@@ -48,10 +54,20 @@ fn a_leg_without_the_key_has_no_lead_and_one_with_it_the_inverse_of_its_mode() {
         })
         .collect();
     let at = |n: usize, back: usize| if n < back { 0.0 } else { demand[n - back] };
+    // k_s u of the reversal curve that the leg is on: its gain grows from a turn on.
+    let (mut turn, mut driven) = (0.0, vec![0.0]);
+    for n in 0..demand.len() {
+        let change = at(n, 0) - at(n, 1);
+        if (at(n, 1) - turn) * change < 0.0 {
+            turn = at(n, 1);
+        }
+        driven.push(driven[n] + change / (1.0 + resonance.gain_growth * (demand[n] - turn).abs()));
+    }
     let distorted: Vec<f64> = (0..demand.len())
         .map(|n| {
-            let (change, before) = (at(n, 0) - at(n, 1), at(n, 1) - at(n, 2));
-            let addition = change * lead.ticks + (change - before) * lead.bend.unwrap();
+            let before = if n == 0 { 0.0 } else { driven[n - 1] };
+            let (first, last) = (driven[n + 1] - driven[n], driven[n] - before);
+            let addition = first * resonance.lag + (first - last) * resonance.bend;
             demand[n] + addition.clamp(-lead.limit, lead.limit)
         })
         .collect();

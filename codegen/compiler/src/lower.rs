@@ -220,6 +220,6 @@ fn hysteresis(
         tables: distinct,
         table_of_leg,
         rate: rate::lower(model, tables, rate_tables, around, scalar),
-        lead: rate::lead(model, scalar),
+        lead: rate::lead(model, tables, around, scalar),
     }
 }

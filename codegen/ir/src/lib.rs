@@ -359,11 +359,22 @@ impl BoucWen {
 pub struct Lead {
     /// Ticks.
     pub ticks: f64,
-    /// Addition over the second difference of the demand; none without `actuator.resonance_gain`.
+    /// Inverse of the resonance; none without `actuator.resonance_gain`.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub bend: Option<f64>,
+    pub resonance: Option<Resonance>,
     /// Largest addition, m.
     pub limit: f64,
+}
+
+/// Inverse of a leg's resonance, over the differences of its voltage in the units of small motion.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct Resonance {
+    /// Addition over the first difference: 2ζ/ω, ticks.
+    pub lag: f64,
+    /// Addition over the second difference: 1/ω², ticks².
+    pub bend: f64,
+    /// Relative growth of the gain over the distance from a turn, 1/m.
+    pub gain_growth: f64,
 }
 
 /// Converter and limits.

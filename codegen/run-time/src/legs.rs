@@ -21,9 +21,11 @@ law_constants! {
     }
     of (convert, ir: &Ir, asked: Option<&ir::Lead>);
     own led: bool = asked.is_some();
-    own bent: bool = asked.is_some_and(|lead| lead.bend.is_some());
+    own bent: bool = asked.is_some_and(|lead| lead.resonance.is_some());
     copy lead: T = convert.real(asked.map_or(0.0, |lead| lead.ticks));
-    copy bend: T = convert.real(asked.and_then(|lead| lead.bend).unwrap_or(0.0));
+    copy lag: T = convert.real(resonance(asked).lag);
+    copy bend: T = convert.real(resonance(asked).bend);
+    copy gain_growth: T = convert.real(resonance(asked).gain_growth);
     copy lead_limit: T = convert.real(asked.map_or(0.0, |lead| lead.limit));
     lend leg_setpoint: [T; 2] = convert.vector(&ir.bounds.leg);
     copy leg_gain: T = convert.real(ir.defaults.leg_gain);
@@ -46,6 +48,11 @@ impl<T: Number> Constants for LegConstants<T> {
             leg.change.given = self.bent;
         }
     }
+}
+
+/// That of `lead`, or none.
+fn resonance(lead: Option<&ir::Lead>) -> ir::Resonance {
+    lead.and_then(|lead| lead.resonance.clone()).unwrap_or_default()
 }
 
 /// The constants of a compiled spec.

@@ -140,8 +140,8 @@ impl<T: Real + Debug> LastChange<T> for Optional<Change<T, 1>> {
     }
 
     #[inline]
-    fn bend(&mut self, change: T) -> Option<T> {
-        if self.given { self.part.bend(change) } else { None }
+    fn differences(&mut self, before: T, change: T, growth: T) -> Option<[T; 2]> {
+        if self.given { self.part.differences(before, change, growth) } else { None }
     }
 }
 

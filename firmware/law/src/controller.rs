@@ -89,7 +89,9 @@ macro_rules! controller {
 
             $crate::controller! { @accessors
                 lead -> Real = hysteresis::LEAD;
+                lag -> Real = hysteresis::LAG;
                 bend -> Real = hysteresis::BEND;
+                gain_growth -> Real = hysteresis::GAIN_GROWTH;
                 lead_limit -> Real = hysteresis::LEAD_LIMIT;
                 leg_setpoint -> &[Real; 2] = &gauges::LEG_SETPOINT;
                 leg_gain -> Real = defaults::LEG_GAIN;

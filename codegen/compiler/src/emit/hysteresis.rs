@@ -18,17 +18,23 @@ pub fn emit(ir: &Ir) -> TokenStream {
     let lead = ir.task_space.is_none().then(|| {
         let (ticks, limit) = h.lead.as_ref().map_or((0.0, 0.0), |lead| (lead.ticks, lead.limit));
         let (ticks, limit, led) = (literal::real(ir.scalar, ticks), literal::real(ir.scalar, limit), h.lead.is_some());
-        let bend = h.lead.as_ref().and_then(|lead| lead.bend);
-        let (bent, bend) = (bend.is_some(), literal::real(ir.scalar, bend.unwrap_or(0.0)));
+        let resonance = h.lead.as_ref().and_then(|lead| lead.resonance.as_ref());
+        let bent = resonance.is_some();
+        let [lag, bend, growth] = resonance.map_or([0.0; 3], |r| [r.lag, r.bend, r.gain_growth]);
+        let [lag, bend, growth] = [lag, bend, growth].map(|value| literal::real(ir.scalar, value));
         quote! {
             /// Whether the set-points of the legs lead, to compensate their dead time and resonance.
             pub const LED: bool = #led;
-            /// Lead of the leg set-points, ticks; from `hysteresis.dead_time` and `actuator.resonance_gain`.
+            /// Lead of the leg set-points, ticks; from `hysteresis.dead_time`.
             pub const LEAD: Real = #ticks;
             /// Whether the resonance of the legs is compensated.
             pub const BENT: bool = #bent;
-            /// Addition to a set-point over its second difference; from `actuator.resonance_gain`.
+            /// Lag of the resonance, ticks; from `actuator.resonance` and `damping_ratio`.
+            pub const LAG: Real = #lag;
+            /// Addition to a set-point over the second difference of the voltage; from `actuator.resonance`.
             pub const BEND: Real = #bend;
+            /// Relative growth of a leg's gain over the distance from its last turn, 1/m; from `actuator.resonance_gain`.
+            pub const GAIN_GROWTH: Real = #growth;
             /// Largest lead that is added to a demand, m; from `actuator.slew_rate`.
             pub const LEAD_LIMIT: Real = #limit;
         }
@@ -215,8 +221,8 @@ fn rate_doc(ir: &Ir) -> Vec<&'static str> {
     }
     if let Some(lead) = &ir.hysteresis.lead {
         lines.push(" T is advanced by `LEAD` ticks at its own rate, for the dead time of the legs.");
-        if lead.bend.is_some() {
-            lines.push(" `BEND` times its second difference is added, for their resonance.");
+        if lead.resonance.is_some() {
+            lines.push(" For their resonance, `LAG` and `BEND` times the differences of the voltage are added.");
         }
     }
     if !lines.is_empty() {

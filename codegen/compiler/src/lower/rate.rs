@@ -1,8 +1,8 @@
 //! Rate dependence of the leg model: constants at the period of the spec.
 
-use crate::ir::{BoucWen, LEGS, Lead, RateModel, Scalar};
+use crate::ir::{BoucWen, LEGS, Lead, RateModel, Resonance, Scalar};
 use specgen_identify::everett::EverettTable;
-use specgen_identify::leg_model::Around;
+use specgen_identify::leg_model::{Around, strokes};
 use specgen_language::model::{Model, RateDependence};
 
 use specgen_runtime::bouc_wen::READ_OUT;
@@ -128,21 +128,29 @@ fn bouc_wen(model: &Model, tables: &[EverettTable], around: &[Option<Around>], s
 }
 
 /// The dead time less half a period, because a held voltage corresponds to the middle of its tick, and for six legs with
-/// `actuator.resonance_gain` the inverse of the mode: q + k (2ζ/ω q̇ + q̈/ω²), by backward differences. Bounded by the motion of the
-/// legs at the amplifier's slew rate within the dead time and the k/ω of the mode, so that jumps of the demand are not extrapolated
+/// `actuator.resonance_gain` the inverse of the mode: q + k_s (2ζ/ω u̇ + ü/ω²), by backward differences. Bounded by the motion of the
+/// legs at the amplifier's slew rate within the dead time and 1/ω of the mode, so that jumps of the demand are not extrapolated
 /// further.
-pub(super) fn lead(model: &Model, scalar: Scalar) -> Option<Lead> {
+pub(super) fn lead(model: &Model, tables: &[EverettTable], around: &[Option<Around>], scalar: Scalar) -> Option<Lead> {
+    let round = |value: f64| scalar.round(value);
     let period = model.timing.period;
     let late = model.hysteresis.dead_time - 0.5 * period;
     let late = if late > 0.0 { late } else { 0.0 };
-    let gain = model.actuator.resonance_gain.filter(|_| model.task_space.is_none());
+    let share = model.actuator.resonance_gain.filter(|_| model.task_space.is_none());
     let omega = core::f64::consts::TAU * model.actuator.resonance;
-    let (lag, reach) =
-        gain.map_or((0.0, 0.0), |gain| (2.0 * gain * model.actuator.damping_ratio / omega, gain / omega));
-    let bend = gain.map(|gain| scalar.round(gain / (omega * period * (omega * period))));
-    (late > 0.0 || bend.is_some()).then(|| Lead {
-        ticks: scalar.round((late + lag) / period),
-        bend,
-        limit: scalar.round((late + reach) * model.actuator.slew_rate * model.actuator.leg_gain()),
+    let reach = share.map_or(0.0, |_| 1.0 / omega);
+    let resonance = share.map(|share| Resonance {
+        lag: round(2.0 * model.actuator.damping_ratio / (omega * period)),
+        bend: round(1.0 / (omega * period * (omega * period))),
+        gain_growth: round(2.0 * (1.0 / share - 1.0) / mean(&strokes(tables, around))),
+    });
+    (late > 0.0 || resonance.is_some()).then(|| Lead {
+        ticks: round(late / period),
+        resonance,
+        limit: round((late + reach) * model.actuator.slew_rate * model.actuator.leg_gain()),
     })
+}
+
+fn mean(values: &[f64]) -> f64 {
+    values.iter().fold(0.0, |sum, value| sum + value) / values.len() as f64
 }

@@ -11,13 +11,17 @@ pub struct LegSpace;
 pub trait SixLegs: Spec<Law = LegSpace> {
     /// Lead that compensates a leg's dead time, or none.
     type Lead: DeadTimeLead<Self::Real>;
-    /// Last change of a leg's demand, for the compensation of its resonance; or nothing.
+    /// Last change of a leg's voltage, for the compensation of its resonance; or nothing.
     type Change: LastChange<Self::Real>;
 
     /// Lead of the leg displacements, ticks.
     fn lead(&self) -> Self::Real;
-    /// Addition to the demand over its second difference, for the resonance.
+    /// Lag of the resonance, ticks.
+    fn lag(&self) -> Self::Real;
+    /// Addition to the demand over the second difference of the voltage, for the resonance.
     fn bend(&self) -> Self::Real;
+    /// Relative growth of a leg's gain over the distance from the last turn, 1/m.
+    fn gain_growth(&self) -> Self::Real;
     /// Largest lead, m.
     fn lead_limit(&self) -> Self::Real;
     /// Lowest and highest permitted set-point of a leg, m.

@@ -27,7 +27,11 @@ specgen_runtime::state! { |words|
     }
 }
 
-/// The change of a leg's demand in the last tick, for its second difference; or nothing.
+/// The change of a leg's voltage in the last tick, for its second difference; or nothing.
+///
+/// The mode moves with the voltage, not with the demand: for the same change of the demand, the voltage changes most
+/// just after a turn, where the leg has the gain k_s of small motion. Farther from the turn the gain grows, here in
+/// proportion to the distance (Rayleigh's law). Changes are in the units of small motion, k_s Δu.
 pub trait LastChange<T: Real>: Copy + Debug + Snapshot {
     /// No change.
     const REST: Self;
@@ -36,8 +40,9 @@ pub trait LastChange<T: Real>: Copy + Debug + Snapshot {
     fn rest(&mut self) {
         *self = Self::REST;
     }
-    /// The second difference of the demand, m, which changes by `change` (m) in this tick.
-    fn bend(&mut self, change: T) -> Option<T>;
+    /// First and second difference k_s Δu, m, as the demand goes on from `before` by `change` (m). `growth` (1/m, ≥ 0)
+    /// is the relative growth of the gain over the distance from the last turn.
+    fn differences(&mut self, before: T, change: T, growth: T) -> Option<[T; 2]>;
 }
 
 specgen_runtime::state! { |words|
@@ -45,17 +50,24 @@ specgen_runtime::state! { |words|
     pub struct Change<T, N>[T: Real, const N: usize] {
         /// m.
         last: [T; N] = [T::ZERO; N], numbers(words.sizes().leg);
+        /// Demand at the last turn, m.
+        turn: [T; N] = [T::ZERO; N], numbers(words.sizes().leg);
     }
 }
 
 impl<T: Real + Debug, const N: usize> LastChange<T> for Change<T, N> {
     const REST: Self = Self::new();
     #[inline(always)]
-    fn bend(&mut self, change: T) -> Option<T> {
-        let last = self.last.first_mut()?;
-        let bend = change - *last;
-        *last = change;
-        Some(bend)
+    fn differences(&mut self, before: T, change: T, growth: T) -> Option<[T; 2]> {
+        let (last, turn) = (self.last.first_mut()?, self.turn.first_mut()?);
+        if (before - *turn) * change < T::ZERO {
+            *turn = before;
+        }
+        let distance = (before - *turn) + change;
+        let of_drive = change / (T::ONE + growth * distance.abs());
+        let second = of_drive - *last;
+        *last = of_drive;
+        Some([of_drive, second])
     }
 }
 

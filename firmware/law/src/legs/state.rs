@@ -20,7 +20,7 @@ specgen_runtime::state! { |words|
         /// Lead on the demand that compensates dead time and resonance, m; none without `hysteresis.dead_time` and
         /// `actuator.resonance_gain`.
         pub lead: P::Lead = P::Lead::REST, part;
-        /// Last change of the demand, m; none without `actuator.resonance_gain`.
+        /// Last change of the voltage and last turn, m; none without `actuator.resonance_gain`.
         pub change: P::Change = P::Change::REST, part;
     }
 }

@@ -36,10 +36,10 @@ pub fn advance<P: SixLegs>(
             adapt(config, leg, fallback, input.displacement[index]);
         }
         let change = state.demand[index] - demand_before[index];
-        let bend = leg.change.bend(change);
+        let of_drive = leg.change.differences(demand_before[index], change, p.gain_growth());
         leg.lead.ask(|| {
-            let lead = match bend {
-                Some(bend) => change * p.lead() + bend * p.bend(),
+            let lead = match of_drive {
+                Some([first, second]) => change * p.lead() + (first * p.lag() + second * p.bend()),
                 None => change * p.lead(),
             };
             saturate(lead, -p.lead_limit(), p.lead_limit())

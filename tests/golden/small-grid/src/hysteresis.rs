@@ -19,14 +19,20 @@ pub const MEMORY: usize = 16;
 /// Whether the set-points of the legs lead, to compensate their dead time and resonance.
 pub const LED: bool = false;
 
-/// Lead of the leg set-points, ticks; from `hysteresis.dead_time` and `actuator.resonance_gain`.
+/// Lead of the leg set-points, ticks; from `hysteresis.dead_time`.
 pub const LEAD: Real = 0.0;
 
 /// Whether the resonance of the legs is compensated.
 pub const BENT: bool = false;
 
-/// Addition to a set-point over its second difference; from `actuator.resonance_gain`.
+/// Lag of the resonance, ticks; from `actuator.resonance` and `damping_ratio`.
+pub const LAG: Real = 0.0;
+
+/// Addition to a set-point over the second difference of the voltage; from `actuator.resonance`.
 pub const BEND: Real = 0.0;
+
+/// Relative growth of a leg's gain over the distance from its last turn, 1/m; from `actuator.resonance_gain`.
+pub const GAIN_GROWTH: Real = 0.0;
 
 /// Largest lead that is added to a demand, m; from `actuator.slew_rate`.
 pub const LEAD_LIMIT: Real = 0.0;
