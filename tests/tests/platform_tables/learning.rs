@@ -445,8 +445,9 @@ fn where_there_is_nothing_to_learn_nothing_gets_worse() {
         let plan = Plan::new(&learnable, &motion, &convergence, &factors, 8192).unwrap();
         let spacing = convergence.spacing(PERIOD);
         let update = Update::new(&learnable, &motion, &convergence, spacing);
-        for (who, learner, spacing) in
-            [("host", Learner::Host(&update), spacing), ("device", Learner::Device(&plan), plan.spacing)]
+        // Passes after the best one. Two idle ones in a row end learning, and so does a worse one: on the host, the third.
+        for (who, learner, spacing, most) in
+            [("host", Learner::Host(&update), spacing, 6), ("device", Learner::Device(&plan), plan.spacing, 2)]
         {
             let (mut controller, mut prepared) = (bench.controller(), machine.rig().clone());
             let mut rig = Rig::new(&mut prepared, &mut controller, PERIOD, 0).unwrap();
@@ -470,7 +471,7 @@ fn where_there_is_nothing_to_learn_nothing_gets_worse() {
             assert!(best.translation_nm <= first.translation_nm + noise && kept <= bare + noise, "{learned:?}");
             assert!(learned.best == 0 || best.measured_nm < first.measured_nm, "{learned:?}");
             let gained_nothing = learned.passes.len() - 1 - learned.best;
-            assert!(learned.ending != Ending::AllPasses && gained_nothing <= 2, "{learned:?}");
+            assert!(learned.ending != Ending::AllPasses && gained_nothing <= most, "{learned:?}");
         }
     }
 }

@@ -21,6 +21,8 @@ pub const LARGEST_RADIUS: f64 = 0.9;
 const ORDERS: [f64; 2] = [8.0, 4.0];
 /// A correction is not learned where the loop passes less of it than this: there the feedback suffices.
 const LEAST_LEFT: f64 = 0.004;
+/// Frequency that counts as rest, relative to the lowest one tried.
+const REST: f64 = 1e-3;
 /// Candidate shares of the inverse: a smaller share learns more slowly, but tolerates more uncertainty.
 const SHARES: [f64; 11] = [1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.2, 0.1, 0.0];
 /// Share of the inverse of a measured T: legs with hysteresis answer a sweep and a correction of another size differently.
@@ -271,9 +273,8 @@ impl Learnable {
         let (inverses, shares, radii) = self.modelled(&frequencies, factors);
         let highest = highest_passed(frequencies.iter().zip(&radii).map(|(hertz, radius)| [*hertz, *radius]), wish)?;
         let lowest = *frequencies.first()?;
-        // The lowest frequency at which every mode responds.
-        let answers = frequencies.iter().zip(&inverses).find(|(_, inverse)| norm(inverse) * LEAST_LEFT <= 1.0);
-        let low = answers.map(|(hertz, _)| *hertz).filter(|hertz| *hertz > lowest).unwrap_or(0.0);
+        let answers = frequencies.iter().zip(&inverses).find(|(_, inverse)| responds(inverse));
+        let low = answers.map_or(0.0, |(hertz, _)| self.lower_end(*hertz, lowest));
         if !(highest > lowest && highest > low) {
             return None;
         }
@@ -301,13 +302,13 @@ impl Learnable {
     fn slower(&self, mut found: Convergence, factors: &Factors, wish: f64) -> Convergence {
         let frequencies: Vec<f64> = self.grid(wish).into_iter().filter(|hertz| *hertz < found.edge).collect();
         let (inverses, shares, radii) = self.modelled(&frequencies, factors);
-        let learned = |k: &usize| radii[*k] <= LARGEST_RADIUS && norm(&inverses[*k]) * LEAST_LEFT <= 1.0;
+        let learned = |k: &usize| radii[*k] <= LARGEST_RADIUS && responds(&inverses[*k]);
         // The band that ends where the measured one begins.
         let first = (0..frequencies.len()).rev().take_while(learned).last();
         let Some(first) = first else { return found };
         let slow = frequencies[first..].iter().zip(&shares[first..]).map(|(hertz, share)| [*hertz, *share]);
         let fast = found.shares.iter().copied().filter(|[hertz, _]| *hertz >= found.edge);
-        let band = [if first == 0 { 0.0 } else { frequencies[first] }, found.band[1]];
+        let band = [self.lower_end(frequencies[first], frequencies[0]), found.band[1]];
         let shares = slow.chain(fast).collect();
         let (edge, delay) = (found.edge, middle_delay(factors));
         let bounds = std::mem::take(&mut found.bounds);
@@ -319,6 +320,15 @@ impl Learnable {
             whole.meet(hertz, radius);
         }
         whole
+    }
+
+    /// Lower end (Hz) of a band whose lowest frequency is `first`, if frequencies down to `lowest` were tried: 0 if every mode responds at rest.
+    /// With an integral, none does: T⁻¹ would turn the smallest constant error into a large constant correction, the fades at both ends of a
+    /// pass would cut it off, and the next pass would learn from what the cuts leave.
+    fn lower_end(&self, first: f64, lowest: f64) -> f64 {
+        let at_rest = self.nominal(&[REST * lowest]);
+        let all = first <= lowest && at_rest.iter().all(|response| responds(&inverse(response)));
+        if all { 0.0 } else { first }
     }
 
     /// By the model, at each frequency (Hz): T⁻¹, the share of it used, and the largest radius over the machines within `factors`.
@@ -421,6 +431,11 @@ impl Learnable {
         }
         all
     }
+}
+
+/// Whether the loop passes enough of a correction in every mode, by its T⁻¹.
+fn responds(inverse: &Matrix6c) -> bool {
+    norm(inverse) * LEAST_LEFT <= 1.0
 }
 
 /// The middle of the interval of the delay, ticks.
