@@ -5,9 +5,10 @@
 //!                                                  axial stiffness and damping ──┴─► rigid platform ◄─ work part
 //!                                                       gauges ◄─ pose ─────────────────┘      └─► force sensor
 //! ```
-//! It is independent of the controller: dynamics from the motion of the bodies, leg lengths and gauge readings by plain
-//! geometry; play operators (Prandtl-Ishlinskii) with a quadratic asymmetry, which breaks congruency, and creep: no
-//! Everett table represents them. SI units; angles are those of R = Rz Ry Rx.
+//! It shares no model with the controller. The dynamics follow from the motion of the bodies, leg lengths and gauge
+//! readings from the geometry. The legs are play operators (Prandtl-Ishlinskii) with creep and a quadratic asymmetry.
+//! The asymmetry breaks congruency, so that no Everett table can represent these legs. SI units; angles are those of
+//! R = Rz Ry Rx.
 
 #![allow(clippy::needless_range_loop, reason = "matrices are indexed as in their formulae")]
 
@@ -44,7 +45,7 @@ pub use sensor::ForceSensor;
 pub use specimen::Specimen;
 pub use structure::{Structure, StructureParameters};
 
-/// The larger of two errors. Unlike `f64::max` it keeps a NaN, which no bound accepts.
+/// The larger of two errors. Unlike `f64::max` it keeps a NaN, so that a test with a bound fails.
 #[cfg(test)]
 fn worse(a: f64, b: f64) -> f64 {
     if a.is_nan() || a >= b { a } else { b }

@@ -1,4 +1,5 @@
-//! The compiler as one function: spec file to the constants of a controller. [`Compilation::files`] emits the workspace.
+//! The compiler as one function: from a spec file to the constants of a controller. [`Compilation::files`] emits the workspace. It
+//! writes nothing.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -30,7 +31,7 @@ pub struct Compilation {
     pub source: SpecSource,
     /// The checked model.
     pub model: Model,
-    /// How each record was identified, in the order of `hysteresis.records`; none for one that is a table already.
+    /// Report of the identification of each record, in the order of `hysteresis.records`; none if the file is a table.
     pub records: Vec<Option<identify::Report>>,
     /// Stability of the adaptation of six legs with their own gauges.
     pub margins: Option<Margins>,
@@ -38,7 +39,7 @@ pub struct Compilation {
     pub design: Option<Design>,
     /// Reach of the platform and conditioning of its geometry, for a controller in task space.
     pub reach: Option<Reach>,
-    /// What each trajectory demands of the legs, in the order of the spec.
+    /// Demand of each trajectory on the legs, in the order of the spec.
     pub demands: Vec<PathDemand>,
     /// Stopping distances from every declared speed.
     pub stops: Vec<Stopping>,
@@ -62,10 +63,10 @@ impl Compilation {
         workspace::files_with(&self.ir, &emit::emit(&self.ir), &[target.name])
     }
 
-    /// Requirements that the spec does not meet although it compiles. `check` and `build` report them as errors; a simulation
-    /// still runs.
+    /// Requirements that the spec does not meet although it compiles. `check` and `build` report them as errors; a
+    /// simulation still runs.
     #[must_use]
-    pub fn missed(&self) -> Vec<Diagnostic> {
+    pub fn unmet_requirements(&self) -> Vec<Diagnostic> {
         rest::check(&self.model, &self.rest_noise)
     }
 }
@@ -84,7 +85,7 @@ pub fn compile(path: &Path) -> Result<Compilation, Refusal> {
 /// As [`compile`].
 pub fn compile_source(source: SpecSource) -> Result<Compilation, Refusal> {
     let mut findings = Vec::new();
-    let compiled = phases(&source, &mut findings);
+    let compiled = run_phases(&source, &mut findings);
     lint::in_order(&source, &mut findings);
     match compiled {
         Some(compiled) => Ok(Compilation { findings, ..compiled }),
@@ -92,32 +93,33 @@ pub fn compile_source(source: SpecSource) -> Result<Compilation, Refusal> {
     }
 }
 
-/// The phases in their order. None: at least one of `findings` is an error.
-fn phases(source: &SpecSource, findings: &mut Vec<Diagnostic>) -> Option<Compilation> {
+/// Runs the phases in their order. None if one of `findings` is an error.
+fn run_phases(source: &SpecSource, findings: &mut Vec<Diagnostic>) -> Option<Compilation> {
     let model = check_spec(source, findings)?;
 
     // These are independent: one run reports the findings of all of them.
-    let stability = accepted(check_stability(&model), findings);
-    let records = accepted(declared::records(&model, &source.dir), findings);
-    let setpoints = accepted(setpoint::declared(&model, &source.dir), findings);
-    let converters = accepted(requirements::check(&model), findings);
+    let stability = accept(check_stability(&model), findings);
+    let records = accept(declared::records(&model, &source.dir), findings);
+    let setpoints = accept(setpoint::declared(&model, &source.dir), findings);
+    let converters = accept(requirements::check(&model), findings);
     let ((margins, design), records, setpoints, ()) = (stability?, records?, setpoints?, converters?);
     findings.extend(records.warnings);
     findings.extend(design.iter().flat_map(|design| design.findings.clone()));
     findings.extend(setpoints.warnings);
 
     let strokes = strokes(&records.tables, &records.around);
-    let demand = accepted(demand::check(&model, setpoints.setpoints.as_ref(), &strokes), findings)?;
+    let demand = accept(demand::check(&model, setpoints.setpoints.as_ref(), &strokes), findings)?;
     findings.extend(demand.warnings);
 
     let digest = lower::digest(&source.text, records.texts.iter().chain(&setpoints.texts));
+    // Only a controller in task space has a design and generates set-points.
     let task = design.as_ref().zip(setpoints.setpoints);
     let assumptions = Assumptions::of(&model, records.simulated);
     let origin = Origin { digest: &digest, assumed: assumptions.list() };
     let ir =
-        accepted(lower::lower(&model, task, &records.tables, &records.rate_tables, &records.around, origin), findings)?;
-    let pose_noise = accepted(lower::pose_noise(&model), findings)?;
-    let rest_noise = accepted(rest::noise(&model, design.as_ref()), findings)?;
+        accept(lower::lower(&model, task, &records.tables, &records.rate_tables, &records.around, origin), findings)?;
+    let pose_noise = accept(lower::pose_noise(&model), findings)?;
+    let rest_noise = accept(rest::noise(&model, design.as_ref()), findings)?;
     lint::allow(&model, findings);
     findings.extend(lint::unused(&model, findings));
     debug_assert!(findings.iter().all(|finding| finding.severity < Severity::Error));
@@ -138,15 +140,16 @@ fn phases(source: &SpecSource, findings: &mut Vec<Diagnostic>) -> Option<Compila
     })
 }
 
-/// The result of a phase; or none, with the errors added to `findings`.
-fn accepted<T>(made: Result<T, Vec<Diagnostic>>, findings: &mut Vec<Diagnostic>) -> Option<T> {
-    made.map_err(|found| findings.extend(found)).ok()
+/// The result of a phase; or none, with its errors added to `findings`.
+fn accept<T>(result: Result<T, Vec<Diagnostic>>, findings: &mut Vec<Diagnostic>) -> Option<T> {
+    result.map_err(|errors| findings.extend(errors)).ok()
 }
 
-/// Reads the spec and checks its values, each and together.
+/// Reads the spec, and checks each value and their relations.
 fn check_spec(source: &SpecSource, findings: &mut Vec<Diagnostic>) -> Option<Model> {
-    let (model, found) = spec::load_as_far(source);
-    findings.extend(found);
+    // With some errors there is still a model, so that the checks below can find more.
+    let (model, errors) = spec::load_as_far(source);
+    findings.extend(errors);
     let model = model?;
     findings.extend(reach::check_bounds(&model));
     findings.extend(lint::check(&model));
@@ -154,13 +157,12 @@ fn check_spec(source: &SpecSource, findings: &mut Vec<Diagnostic>) -> Option<Mod
     if findings.iter().all(|finding| finding.severity < Severity::Error) {
         return Some(model);
     }
-    // Paths can be checked without a valid platform, so they are reported in the same run.
-    findings.extend(setpoint::declared(&model, &source.dir).map_or_else(|found| found, |paths| paths.warnings));
+    // Paths can be checked without a valid platform, so their findings are reported in the same run.
+    findings.extend(setpoint::declared(&model, &source.dir).map_or_else(|errors| errors, |paths| paths.warnings));
     None
 }
 
-/// Checks stability. Legs with their own gauges adapt independently; a controller in task space closes its loops over the
-/// platform's modes.
+/// Checks stability: of the adaptation of each leg without `[control]`, otherwise of the loops over the platform's modes.
 ///
 /// # Errors
 /// As [`stability::check`] or [`stability::platform::design`].

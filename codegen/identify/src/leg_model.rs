@@ -1,17 +1,18 @@
-//! A leg model chosen from the record: families of models fitted to one record, and the choice among them.
+//! Leg models: families of models are fitted to one record, and the simplest good one is chosen.
 //!
 //! ```text
-//! P = Σ f_i(p_i) − A z + c₀        p_i: plays of the drive;  dz = du (1 − s β z − γ |z|),  s = sign du      V, µm
-//! P = G(h)                         polynomial, rises over the travel
-//! y = h + c Σ L_j h                creep of one level c at fixed time constants, a decade apart
+//! P = Σ f_i(p_i) − A z + c₀        p_i: plays of the drive u, V;  dz = du (1 − s β z − γ |z|),  s = sign du
+//! P = G(h)                         read-out: a polynomial that rises over the travel;  P, h, y in µm
+//! y = h + c Σ L_j h                creep: L_j are first-order lags, time constants a decade apart, one weight c
 //! ```
-//! A family is a choice of parts; today's Everett table is one, too. All are fitted by variable projection (Golub and
-//! Pereyra 1973): only c, β, γ and the first z are searched, the rest is non-negative least squares inside. The start of
-//! the creep is free. Plays become a table: E(a, b) is what they gain on the way from b to a.
+//! A family is a subset of these parts; an Everett table alone is the simplest family. All families are fitted by
+//! variable projection (Golub and Pereyra 1973): c, β, γ and the initial z are searched, and for each trial all other
+//! parameters are a non-negative least-squares solution. The initial creep states are free parameters, too. The fitted
+//! plays become a table: E(a, b) is the rise of Σ f_i when the drive goes from b to a.
 //!
-//! Families are compared in displacement on whole curves that were held out, in folds. The simplest one whose error is
-//! within one standard error of the best, or a tenth of its error and a fifth of the noise, is chosen; the Everett
-//! table is the simplest.
+//! Families are compared by cross-validation: whole curves are held out, in folds. The simplest family within one
+//! standard error of the best is chosen. A family with plays or a Bouc-Wen state may also be worse by a tenth of the
+//! least error plus a fifth of the noise.
 
 mod families;
 mod family;
@@ -27,21 +28,21 @@ pub use families::{Choice, FamilyScore, choose};
 pub use family::Family;
 pub use file::{read_leg_csv, write_leg_csv};
 
-/// Coefficients of a read-out.
+/// Number of coefficients of a read-out: powers 1 to 5.
 const READ_OUT: usize = 5;
-/// Most creep operators, as `hysteresis.creep_times`.
+/// Largest number of creep operators, as in `hysteresis.creep_times`.
 const MOST_CREEP_TERMS: usize = 6;
 
-/// What is around the table of a leg: the line `# leg-model` of its file. See the module for the equations; there z is in
-/// units of the drive, here it is A z.
+/// Parameters of a leg model in addition to its table: the line `# leg-model` of the table's file. The equations are those
+/// of the module, but the Bouc-Wen state here is A z, in µm.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Around {
-    /// G from rest: coefficients of h, h², …, µm^(1−k).
+    /// G: coefficients of h, h², …, hᵏ, µm^(1−k); G(0) = 0 at rest.
     pub read_out: [f64; READ_OUT],
-    /// h at full drive, µm: G rises from 0 to here.
+    /// h at full drive, µm: G must rise from 0 to here.
     pub travel_um: f64,
-    /// A: what the Bouc-Wen state takes of a small step, µm/V; 0 without one.
+    /// A: slope of the Bouc-Wen state at z = 0, µm/V; 0 without such a state.
     #[serde(rename = "slope_um_per_V")]
     pub slope: f64,
     /// β, 1/V.
@@ -57,10 +58,10 @@ pub struct Around {
 }
 
 impl Around {
-    /// Share of the travel beyond its ends where the read-out is used.
+    /// The read-out is also used beyond both ends of the travel, up to this share of it.
     pub const MARGIN: f64 = 0.02;
 
-    /// Of a table alone.
+    /// The parameters that leave a table as it is.
     #[must_use]
     pub fn of_table(table: &EverettTable) -> Self {
         let travel_um = table.node(table.grid, 0) * 1e6;
@@ -68,14 +69,14 @@ impl Around {
         Self { read_out, travel_um, slope: 0.0, beta: 0.0, gamma: 0.0, rest_um: 0.0, creep: Vec::new() }
     }
 
-    /// Itself, if a controller can run it.
+    /// Returns the parameters if a controller can use them.
     ///
     /// # Errors
-    /// What is wrong with a value.
-    pub fn checked(self) -> Result<Self, String> {
+    /// The conditions that the values must meet.
+    pub fn validate(self) -> Result<Self, String> {
         let positive = self.travel_um > 0.0 && self.slope >= 0.0 && self.creep.len() <= MOST_CREEP_TERMS;
         let (plus, minus) = (self.beta + self.gamma, self.beta - self.gamma);
-        // |z| stays below its limit, slope / (β + γ).
+        // The state at rest is within its limit, slope/(β + γ).
         let bounded = plus > 0.0 && minus > -plus && self.rest_um.abs() * plus <= self.slope * (1.0 + 1e-6);
         let saturates = bounded || self.slope == 0.0 && self.rest_um == 0.0;
         let creeps = self.creep.iter().all(|[time, weight]| *time > 0.0 && (0.0..1.0).contains(weight));
@@ -104,14 +105,14 @@ impl Around {
         [-Self::MARGIN * self.travel_um, (1.0 + Self::MARGIN) * self.travel_um]
     }
 
-    /// G⁻¹ as a polynomial of the same degree, by least squares over the range; and its largest error, µm. None if G does
-    /// not rise there.
+    /// G⁻¹ as a polynomial of the same degree, by least squares over the range, and its largest error, µm. None if G is not
+    /// monotonic there.
     #[must_use]
     pub fn inverse(&self) -> Option<([f64; READ_OUT], f64)> {
         const POINTS: usize = 64;
         let [low, high] = self.range();
         let (middle, half) = (0.5 * (low + high), 0.5 * (high - low));
-        // Ascending, densest at the ends.
+        // Chebyshev points, ascending: they keep the error small at the ends.
         let angle = |k: usize| core::f64::consts::PI * (k as f64 + 0.5) / POINTS as f64;
         let h: Vec<f64> = (0..POINTS).map(|k| middle - half * libm::cos(angle(k))).collect();
         let p: Vec<f64> = h.iter().map(|h| self.read_out(*h)).collect();
@@ -136,17 +137,17 @@ impl Around {
         Some((inverse, worst))
     }
 
-    /// The state A z after the drive has gone from `from` by `step` (V), µm.
+    /// The state A z, µm, after a step of the drive (V) from the state `before` (µm).
     #[must_use]
-    pub fn state_after(&self, from: f64, step: f64) -> f64 {
+    pub fn state_after(&self, before: f64, step: f64) -> f64 {
         if self.slope == 0.0 {
             return 0.0;
         }
-        self.slope * fit::advanced(from / self.slope, step, [self.beta + self.gamma, self.beta - self.gamma])
+        self.slope * fit::state_after(before / self.slope, step, [self.beta + self.gamma, self.beta - self.gamma])
     }
 
-    /// Turns displacements of the table (m) at `drive` (V) to those of the leg before its creep. `full`: the drive has
-    /// come from the upper end of `range`, not the lower.
+    /// Converts displacements of the table (m) at `drive` (V) to those of the leg before creep. The range of the drive is
+    /// `low` to `high`; `full` means that the drive came from `high`, not from `low`.
     pub(crate) fn complete(&self, displacement: &mut [f64], drive: &[f64], [low, high]: [f64; 2], full: bool) {
         let start = if full { self.state_after(self.rest_um, high - low) } else { self.rest_um };
         let (mut z, mut before) = (start, if full { high } else { low });
@@ -159,15 +160,15 @@ impl Around {
         }
     }
 
-    /// Gain of small motion, m/V: after a reversal the state takes A, and the read-out its mean slope.
+    /// Gain of small motion after a reversal, m/V: that of the table less A, over the mean slope of the read-out.
     pub(crate) fn reversal_gain(&self, table: &EverettTable) -> f64 {
         let slope = self.read_out(self.travel_um) / self.travel_um;
         (table.reversal_gain() - self.slope * 1e-6) / slope
     }
 }
 
-/// Displacement of legs with these tables after full drive for a second, m: a table without creep beside it has that of
-/// its record in it.
+/// Displacement of each leg after one second at full drive, m. Without creep parameters this is the end of its table, which
+/// contains the creep of the record.
 #[must_use]
 pub fn strokes(tables: &[EverettTable], around: &[Option<Around>]) -> Vec<f64> {
     let of = |(k, table): (usize, &EverettTable)| match around.get(k) {
@@ -180,11 +181,11 @@ pub fn strokes(tables: &[EverettTable], around: &[Option<Around>]) -> Vec<f64> {
     tables.iter().enumerate().map(of).collect()
 }
 
-/// A leg: its table and what is around it.
+/// Model of a leg.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LegModel {
-    /// Γ, m.
+    /// Everett table of Γ, m.
     pub table: EverettTable,
-    /// The rest; none in the Preisach model.
+    /// All other parameters; none in the Preisach model.
     pub around: Option<Around>,
 }

@@ -23,13 +23,13 @@ const RECORD_END: Duration = Duration::from_secs(5);
 /// Largest age of a current state.
 pub const MAX_AGE: Duration = Duration::from_millis(300);
 
-/// Status bits of gauges that were not read, or implausible.
+/// Status bits of gauges whose reading failed or is implausible.
 pub const GAUGES: u32 = 0x3f00;
 
 /// Names of the values of a platform's word `command`.
 const COMMANDS: [&str; 4] = ["hold", "stream", "move", "trajectory"];
 
-/// Words of a pose.
+/// Number of words of a pose.
 const POSE: usize = 6;
 
 /// The content of a reply of the expected kind, or [`ClientError::Unexpected`].
@@ -75,11 +75,11 @@ pub struct Session<P> {
     identity: Identity,
     description: Description,
     period: f64,
-    /// Only of a platform.
+    /// None for a controller of six legs.
     motion: Option<Motion>,
-    /// The last sent input words, without measurements.
+    /// Input words that were sent last, without measurements.
     command: Vec<u64>,
-    asked: Instant,
+    last_request: Instant,
     status: Status,
 }
 
@@ -87,7 +87,7 @@ impl<P: Port> Session<P> {
     /// Opens a session and reads the device's description. With a `digest`, the device must run the controller of that spec.
     ///
     /// # Errors
-    /// No answer, or another controller.
+    /// The device does not answer, or runs another controller.
     pub fn open(port: P, timeout: Timeout, digest: Option<&str>) -> Result<Self, OpenError> {
         let OpenSession { client, identity, text, description } = pil::open(port, timeout)?;
         if digest.is_some_and(|digest| digest != description.digest) {
@@ -113,7 +113,7 @@ impl<P: Port> Session<P> {
             period,
             motion,
             command: vec![0; words],
-            asked: Instant::now(),
+            last_request: Instant::now(),
             status: Status::default(),
         };
         session.poll()?;
@@ -158,24 +158,24 @@ impl<P: Port> Session<P> {
         self.client.damaged()
     }
 
-    /// Updates the status; a heartbeat. Events stay until [`Session::health`] is called.
+    /// Updates the status; also a heartbeat. Events stay until [`Session::health`] is called.
     ///
     /// # Errors
     /// As [`Client::ask`], here and below.
     pub fn poll(&mut self) -> Result<&Status, ClientError> {
         self.status = expect!(self.client.ask(&Request::Status)?, Reply::Status(status) => status)?;
-        self.asked = Instant::now();
+        self.last_request = Instant::now();
         self.forget(self.status.phase);
         Ok(&self.status)
     }
 
-    /// Pose of the platform; none for six legs. A heartbeat.
+    /// Pose of the platform; none for six legs. Also a heartbeat.
     pub fn place(&mut self) -> Result<Option<MeasuredPose>, ClientError> {
         let Some(motion) = &self.motion else { return Ok(None) };
         let Reply::Place { tick, phase, status, measured, words } = self.client.ask(&Request::Place)? else {
             return Err(ClientError::Unexpected);
         };
-        self.asked = Instant::now();
+        self.last_request = Instant::now();
         let mut numbers = [0.0; 4 * POSE];
         let given = words.words(numbers.len()).ok_or(ClientError::Unexpected)?;
         for (number, word) in numbers.iter_mut().zip(given) {
@@ -189,7 +189,7 @@ impl<P: Port> Session<P> {
         Ok(Some(MeasuredPose { tick, phase, status, pose, measured, target, voltage: six(3 * POSE) }))
     }
 
-    /// Resets the command words: a machine that is not running has discarded its command.
+    /// Resets the command words unless the machine is running: in any other phase it has discarded its command.
     fn forget(&mut self, phase: u8) {
         if u64::from(phase) != supervisor::Phase::Running.word() {
             self.command.fill(0);
@@ -203,20 +203,21 @@ impl<P: Port> Session<P> {
 
     /// Time since the last request.
     pub fn silence(&self) -> Duration {
-        self.asked.elapsed()
+        self.last_request.elapsed()
     }
 
     /// Time until the next request is due.
     pub fn due(&self) -> Duration {
-        POLL_INTERVAL.saturating_sub(self.asked.elapsed())
+        POLL_INTERVAL.saturating_sub(self.last_request.elapsed())
     }
 
-    /// Requests a block of samples; a heartbeat.
+    /// Requests a block of samples; also a heartbeat.
     pub(crate) fn ask_for_samples(&mut self) -> Result<(Option<&Motion>, Reply<'_>), ClientError> {
-        self.asked = Instant::now();
+        self.last_request = Instant::now();
         Ok((self.motion.as_ref(), self.client.ask(&Request::Samples)?))
     }
 
+    /// Sends a request whose only answer is that it was done.
     pub(crate) fn done(&mut self, request: &Request<'_>) -> Result<(), ClientError> {
         expect!(self.client.ask(request)?, Reply::Done => ())
     }
@@ -231,12 +232,12 @@ impl<P: Port> Session<P> {
         self.done(&Request::Stop)
     }
 
-    /// Names of input words other than measurements.
+    /// Names of the input words that a host may set: all but measurements.
     pub fn free_names(&self) -> &[String] {
         self.description.input_names.get(..self.command.len()).unwrap_or_default()
     }
 
-    /// Command words after these assignments.
+    /// The present command words with these assignments, not yet sent.
     ///
     /// # Errors
     /// A name cannot be set, or its word cannot hold the value.
@@ -259,7 +260,7 @@ impl<P: Port> Session<P> {
         Ok(words)
     }
 
-    /// Sends all words of the command, as [`Session::assign`] gives them.
+    /// Sends all words of a command, see [`Session::assign`].
     pub fn command(&mut self, words: Vec<u64>) -> Result<(), ClientError> {
         let mut bytes = [0; WORDS * size_of::<u64>()];
         let put = put_words(&words, &mut bytes).ok_or(ClientError::TooLong)?;
@@ -275,7 +276,7 @@ impl<P: Port> Session<P> {
         self.done(&Request::SetpointOnEdge { words })
     }
 
-    /// State of the input line. With `drop`, the waiting command is cancelled first.
+    /// State of the input line for triggered commands. With `drop`, the waiting command is cancelled first.
     pub fn edge(&mut self, drop: bool) -> Result<EdgeStatus, ClientError> {
         expect!(self.client.ask(&Request::Edge { drop })?, Reply::Edge(status) => status)
     }
@@ -317,24 +318,24 @@ impl<P: Port> Session<P> {
     }
 
     fn recorder_status(&mut self, action: RecorderAction) -> Result<RecorderStatus, ClientError> {
-        self.asked = Instant::now();
+        self.last_request = Instant::now();
         expect!(self.client.ask(&Request::Recorder { action })?, Reply::Recorder(status) => status)
     }
 
-    /// Appends the next piece of the record; true if it is complete. A heartbeat.
-    pub fn download_on(&mut self, whole: &mut Vec<u8>) -> Result<bool, ClientError> {
+    /// Appends the next part of the record, and returns whether it is complete. Also a heartbeat.
+    pub fn download_part(&mut self, whole: &mut Vec<u8>) -> Result<bool, ClientError> {
         let complete = self.client.fetch_on(|offset| Request::Download { offset }, whole)?;
-        self.asked = Instant::now();
+        self.last_request = Instant::now();
         Ok(complete)
     }
 
-    /// Sends knots of the correction, or rows of a learning plan after them, starting at index `first`.
+    /// Sends knots of a correction, starting at index `first`. Rows of a learning plan follow the knots.
     pub fn put_knots(&mut self, first: usize, knots: &[Knot]) -> Result<(), ClientError> {
         let mut buffer = [0; KNOTS * KNOT];
         for (index, part) in knots.chunks(KNOTS).enumerate() {
             let bytes = specgen_link::Bytes(specgen_link::put_knots(part, 0, &mut buffer));
             self.done(&Request::Knots { first: (first + index * KNOTS) as u32, knots: bytes })?;
-            self.asked = Instant::now();
+            self.last_request = Instant::now();
         }
         Ok(())
     }
@@ -350,7 +351,7 @@ impl<P: Port> Session<P> {
         Ok(specgen_link::Bytes(&bytes).knots().ok_or(ClientError::Unexpected)?.collect())
     }
 
-    /// The correction of the next pass.
+    /// The correction that the device has computed for the next pass.
     pub fn correction(&mut self) -> Result<Vec<Knot>, ClientError> {
         let bytes = self.client.fetch(|offset| Request::Correction { offset })?;
         Ok(specgen_link::Bytes(&bytes).knots().ok_or(ClientError::Unexpected)?.collect())

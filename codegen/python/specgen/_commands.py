@@ -498,13 +498,13 @@ def learn(
 
     Args:
         trajectory: A trajectory of the spec, or ``case-1``, ``case-2``, ``machining``, ``multisine``; ``case-1`` if not given.
-        frequency: Its operating frequency, Hz; 10, or that of the spec, if not given.
+        frequency: Operating frequency of the motion, Hz; that of the spec's trajectory, or 10, if not given.
         passes: Number of learning passes; 5 if not given.
-        bandwidth: Highest frequency to learn, Hz; lowered until every machine within ``[robust]`` converges.
+        bandwidth: Highest frequency to learn, Hz; lowered until learning converges on every machine within ``[robust]``.
         vary: Ranges instead of those of ``[robust]``: ``{"stiffness": "2%"}``.
-        prepare: Start from the correction that the model predicts for lag and modes.
+        prepare: Start from the correction that the model predicts: it compensates lag and platform modes.
         start: Start from this correction, of the same spec, machine and motion.
-        excite: Learn nothing: measure the response of the running loop, and write it to this file.
+        excite: Do not learn: measure the response of the running loop, and write it to this file.
         response: Learn with this measured response instead of the model's.
         on_device: Let the device compute each correction, with storage for this number of knots.
         output: File for the correction of the best pass, for `Machine.play`.

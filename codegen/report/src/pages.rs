@@ -96,7 +96,7 @@ pub fn run(options: &Options, ui: &mut Ui) -> Result<(), Failure> {
         Err(refused) => return self::refused(options, refused, ui),
     };
     // The page reports unmet requirements first among its findings.
-    compiled.findings.splice(0..0, compiled.missed());
+    compiled.findings.splice(0..0, compiled.unmet_requirements());
     ui.findings(Some(&compiled.source), &compiled.findings);
     let output = place(options, &compiled.ir.name);
     check_place(&output)?;

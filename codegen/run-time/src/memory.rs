@@ -179,13 +179,13 @@ impl<T: Real + Debug> LegMemory<T, Table<T>> for Memory<T> {
         table: &Table<T>,
         last: &mut LastLine<T>,
         displacement: T,
-        permitted: impl FnOnce(T) -> Option<T>,
+        permit: impl FnOnce(T) -> Option<T>,
     ) -> bool {
-        with_table!(self, table, (memory, table) => LegMemory::track(memory, table, last, displacement, permitted))
+        with_table!(self, table, (memory, table) => LegMemory::track(memory, table, last, displacement, permit))
     }
 
-    fn follow_within(&mut self, table: &Table<T>, displacement: T, permitted: impl FnOnce(T) -> T) -> bool {
-        with_table!(self, table, (memory, table) => LegMemory::follow_within(memory, table, displacement, permitted))
+    fn follow_within(&mut self, table: &Table<T>, displacement: T, permit: impl FnOnce(T) -> T) -> bool {
+        with_table!(self, table, (memory, table) => LegMemory::follow_within(memory, table, displacement, permit))
     }
 }
 

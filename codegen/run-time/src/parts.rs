@@ -44,15 +44,15 @@ impl<T: Real + Debug> ModalDamping<T> for Optional<Damping<T, 6>> {
     }
 
     #[inline]
-    fn act(&mut self, sections: &Self::Sections, error: &[T; 6]) {
+    fn update(&mut self, sections: &Self::Sections, error: &[T; 6]) {
         if let Some(sections) = sections {
-            self.part.act(sections, error);
+            self.part.update(sections, error);
         }
     }
 
     #[inline]
-    fn beside(&self, wanted: [T; 6]) -> [T; 6] {
-        if self.given { self.part.beside(wanted) } else { wanted }
+    fn add_to(&self, feedback: [T; 6]) -> [T; 6] {
+        if self.given { self.part.add_to(feedback) } else { feedback }
     }
 }
 

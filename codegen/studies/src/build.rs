@@ -88,7 +88,7 @@ pub fn run(options: &Options, ui: &mut Ui) -> Result<(), Failure> {
     } else {
         ui.findings_in_brief(&compiled.source, &compiled.findings);
     }
-    ui.findings(Some(&compiled.source), &compiled.missed());
+    ui.findings(Some(&compiled.source), &compiled.unmet_requirements());
     let output = options
         .output
         .as_deref()

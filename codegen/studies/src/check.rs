@@ -65,7 +65,7 @@ pub fn run(spec: &Path, details: bool, deny_warnings: bool, ui: &mut Ui) -> Resu
     let mut findings = compiled.findings.clone();
     findings.extend(precision::findings(&compiled.model, &precision, compiled.pose_noise.as_ref()));
     findings.extend(lint::estimated(&compiled.model));
-    findings.extend(compiled.missed());
+    findings.extend(compiled.unmet_requirements());
     findings.extend(compiled.reach.iter().flat_map(|reach| reach::notes(&compiled.model, reach)));
     spec_file::accept(&compiled, &findings, deny_warnings)?;
     ui.findings(Some(&compiled.source), &findings);

@@ -280,7 +280,7 @@ fn build(
                 made.notes.push(format!("the time of a tick was not estimated: {why}"));
             }
             made.failures.extend(check_tick_time(compiled, made.measurement.as_ref(), ui));
-            let missed = compiled.missed();
+            let missed = compiled.unmet_requirements();
             made.failures.extend(missed.iter().map(|one| format!("{}: {}; {}", one.code, one.message, one.help)));
             ui.findings(Some(&compiled.source), &missed);
             if !compiled.assumptions.is_empty() {

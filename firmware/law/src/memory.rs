@@ -22,23 +22,23 @@ pub trait LegMemory<T: Real, Table>: Copy + Debug + Snapshot {
     fn apply(&mut self, table: &Table, drive: T) -> T;
     /// The drive for a displacement, m.
     fn solve(&mut self, table: &Table, displacement: T) -> T;
-    /// Applies the drive for a displacement that needs no search, if `permitted` allows it. Returns whether it did.
+    /// Applies the drive for a displacement that needs no search, if `permit` allows it. Returns whether it did.
     #[inline(always)]
     fn track(
         &mut self,
         _table: &Table,
         _last: &mut LastLine<T>,
         _displacement: T,
-        _permitted: impl FnOnce(T) -> Option<T>,
+        _permit: impl FnOnce(T) -> Option<T>,
     ) -> bool {
         false
     }
-    /// Applies the drive that comes as near to a displacement as `permitted` allows. Returns whether the displacement
+    /// Applies the drive that comes as near to a displacement as `permit` allows. Returns whether the displacement
     /// is out of the table's range.
     #[inline(always)]
-    fn follow_within(&mut self, table: &Table, displacement: T, permitted: impl FnOnce(T) -> T) -> bool {
+    fn follow_within(&mut self, table: &Table, displacement: T, permit: impl FnOnce(T) -> T) -> bool {
         let within = self.reaches(table, displacement);
-        let drive = permitted(self.solve(table, displacement));
+        let drive = permit(self.solve(table, displacement));
         self.apply(table, drive);
         !within
     }
@@ -78,13 +78,13 @@ leg_memory! {
             table: &G,
             last: &mut LastLine<T>,
             displacement: T,
-            permitted: impl FnOnce(T) -> Option<T>,
+            permit: impl FnOnce(T) -> Option<T>,
         ) -> bool {
-            self.track(table, last, displacement, permitted)
+            self.track(table, last, displacement, permit)
         }
         #[inline(always)]
-        fn follow_within(&mut self, table: &G, displacement: T, permitted: impl FnOnce(T) -> T) -> bool {
-            self.follow_within(table, displacement, permitted)
+        fn follow_within(&mut self, table: &G, displacement: T, permit: impl FnOnce(T) -> T) -> bool {
+            self.follow_within(table, displacement, permit)
         }
     }
     [T: Real + Debug, G: Grid<T>, const CAP: usize] DynamicEverett<T, G>, DynamicMemory<T, CAP> {
@@ -102,18 +102,18 @@ leg_memory! {
             table: &BoucWenEverett<'a, T, G, K>,
             last: &mut LastLine<T>,
             displacement: T,
-            permitted: impl FnOnce(T) -> Option<T>,
+            permit: impl FnOnce(T) -> Option<T>,
         ) -> bool {
-            self.track(table, last, displacement, permitted)
+            self.track(table, last, displacement, permit)
         }
         #[inline(always)]
         fn follow_within(
             &mut self,
             table: &BoucWenEverett<'a, T, G, K>,
             displacement: T,
-            permitted: impl FnOnce(T) -> T,
+            permit: impl FnOnce(T) -> T,
         ) -> bool {
-            self.follow_within(table, displacement, permitted)
+            self.follow_within(table, displacement, permit)
         }
     }
     ['a, T: Real + Debug, G: Grid<T>, const CAP: usize, const K: usize] CreepEverett<'a, T, G, K>, CreepMemory<T, CAP, K> {}

@@ -95,12 +95,12 @@ impl Bench {
     }
 
     /// A command for the loop, which takes it after this tick.
-    pub fn order(&mut self, order: LoopCommand) {
-        self.outer.orders.push(order).expect("room for an order");
+    pub fn queue(&mut self, order: LoopCommand) {
+        self.outer.commands.push(order).expect("room for an order");
     }
 
     pub fn ask(&mut self, request: Request) {
-        self.order(LoopCommand::Request(OperatorRequest { command: None, request }));
+        self.queue(LoopCommand::Request(OperatorRequest { command: None, request }));
     }
 
     /// Phase after the last tick.
@@ -141,7 +141,7 @@ pub fn row(tick: u64) -> Row {
         place: [0; PLACE_WORDS],
         digest: 0,
         late: 0,
-        orders: 0,
+        commands: 0,
         opens: false,
         waving: false,
         edge: EdgeStatus::NONE,
@@ -159,7 +159,7 @@ pub fn said(phase: Phase) -> SupervisorReport {
         on: phase.is_powered(),
         status: 0,
         tick: 7,
-        orders: 0,
+        commands: 0,
         waving: false,
         late: 0,
     }

@@ -20,7 +20,7 @@ use crate::passes::Passes;
 use crate::words::Command;
 
 /// Commands that may wait for room in the ring: the loop takes one a tick.
-const MOST_ORDERS: usize = 64;
+const MOST_COMMANDS: usize = 64;
 
 pub struct Console {
     pub operator: Arbiter,
@@ -40,7 +40,7 @@ pub struct Console {
     config: Config,
     /// Events that were not yet reported over the link.
     events: u32,
-    orders: VecDeque<LoopCommand>,
+    commands: VecDeque<LoopCommand>,
     /// Number of the last queued command; the first is 1.
     number: u32,
     /// Number of the command that started the last wave.
@@ -67,7 +67,7 @@ impl Console {
             stops: 0,
             config,
             events: 0,
-            orders: VecDeque::new(),
+            commands: VecDeque::new(),
             number: 0,
             wave: None,
             edge: EdgeStatus::NONE,
@@ -86,7 +86,7 @@ impl Console {
         self.events |= row.input.events & !EDGE;
         self.edge = row.edge;
         self.capture.update(row.recorded, row.triggered);
-        let taken = |number: u32| (said.orders.wrapping_sub(number) as i32) >= 0;
+        let taken = |number: u32| (said.commands.wrapping_sub(number) as i32) >= 0;
         if let Some((number, command)) = self.awaited.filter(|(number, _)| taken(*number)) {
             let stage = pending::Stage::from_word(u64::from(row.edge.stage));
             match (stage, command) {
@@ -116,7 +116,7 @@ impl Console {
     /// Other settings from the next tick on.
     pub fn configure(&mut self, config: Config) {
         self.config = config;
-        self.order(LoopCommand::Configure(config));
+        self.queue(LoopCommand::Configure(config));
     }
 
     /// Whether the control law runs, as far as is known.
@@ -127,8 +127,8 @@ impl Console {
     /// Cancels motions that have not been sent to the loop.
     pub fn stop(&mut self) {
         self.stops += 1;
-        let mut number = self.number.wrapping_sub(self.orders.len() as u32);
-        for order in &mut self.orders {
+        let mut number = self.number.wrapping_sub(self.commands.len() as u32);
+        for order in &mut self.commands {
             number = number.wrapping_add(1);
             match order {
                 LoopCommand::Request(wish) => wish.command = None,
@@ -165,10 +165,10 @@ impl Console {
         self.operator.rest_at(&settings.center);
         self.take_pending();
         if on_edge {
-            let number = self.order(LoopCommand::Await(EdgeCommand::Wave, Some(wave)));
+            let number = self.queue(LoopCommand::Await(EdgeCommand::Wave, Some(wave)));
             self.awaited = Some((number, None));
         } else {
-            self.wave = Some(self.order(LoopCommand::Wave(wave)));
+            self.wave = Some(self.queue(LoopCommand::Wave(wave)));
         }
         Ok(())
     }
@@ -185,19 +185,19 @@ impl Console {
             return Err(Refusal::State);
         }
         self.take_pending();
-        let number = self.order(LoopCommand::Await(EdgeCommand::Command(command), None));
+        let number = self.queue(LoopCommand::Await(EdgeCommand::Command(command), None));
         self.awaited = Some((number, Some(command)));
         Ok(())
     }
 
     /// Removes the waiting command.
     pub fn stop_waiting(&mut self) {
-        self.order(LoopCommand::StopWaiting);
+        self.queue(LoopCommand::StopWaiting);
     }
 
     /// Stops the wave, if there is one.
     pub fn stop_wave(&mut self) {
-        self.order(LoopCommand::StopWave);
+        self.queue(LoopCommand::StopWave);
     }
 
     /// Stores knots of the correction of passes.
@@ -224,13 +224,13 @@ impl Console {
         }
         let player = self.passes.begin(course).ok_or(Refusal::Word { index: 0 })?;
         self.take_pending();
-        self.order(LoopCommand::Pass(player));
+        self.queue(LoopCommand::Pass(player));
         Ok(())
     }
 
     /// Ends the pass under way, if there is one.
     pub fn abort_pass(&mut self) {
-        self.order(LoopCommand::AbortPass);
+        self.queue(LoopCommand::AbortPass);
     }
 
     /// Takes the player back. The trajectory that its pass began becomes the command, while the machine runs.
@@ -251,41 +251,41 @@ impl Console {
             return Err(Refusal::Word { index: 0 });
         }
         let order = self.capture.arm(after, self.number.wrapping_add(1));
-        self.order(order);
+        self.queue(order);
         Ok(())
     }
 
     pub fn trigger_recorder(&mut self) {
-        self.order(LoopCommand::Trigger);
+        self.queue(LoopCommand::Trigger);
     }
 
     pub fn stop_recorder(&mut self) {
-        self.order(LoopCommand::StopRecorder);
+        self.queue(LoopCommand::StopRecorder);
     }
 
     /// Whether the queue of commands is full.
     pub fn is_full(&self) -> bool {
-        self.orders.len() >= MOST_ORDERS
+        self.commands.len() >= MOST_COMMANDS
     }
 
     /// Queues a command; returns its number.
-    pub fn order(&mut self, order: LoopCommand) -> u32 {
+    pub fn queue(&mut self, order: LoopCommand) -> u32 {
         self.number = self.number.wrapping_add(1);
-        self.orders.push_back(order);
+        self.commands.push_back(order);
         self.number
     }
 
     /// Queues the operator's request, if it changed.
     pub fn take_pending(&mut self) {
         if let Some(wish) = self.operator.take_pending() {
-            self.order(LoopCommand::Request(wish));
+            self.queue(LoopCommand::Request(wish));
         }
     }
 
     /// Commands that are not sent yet, the oldest first, and the number of the oldest.
     pub fn outgoing(&mut self) -> (&mut VecDeque<LoopCommand>, u32) {
-        let first = self.number.wrapping_sub(self.orders.len() as u32).wrapping_add(1);
-        (&mut self.orders, first)
+        let first = self.number.wrapping_sub(self.commands.len() as u32).wrapping_add(1);
+        (&mut self.commands, first)
     }
 }
 
@@ -305,9 +305,9 @@ mod tests {
         console
     }
 
-    /// A machine that runs, shown with so many orders taken.
-    fn show(console: &mut Console, orders: u32, change: impl Fn(&mut Row, &mut SupervisorReport)) {
-        let (mut row, mut said) = (row(1), SupervisorReport { orders, ..said(Phase::Running) });
+    /// A machine that runs, shown with so many commands taken.
+    fn show(console: &mut Console, commands: u32, change: impl Fn(&mut Row, &mut SupervisorReport)) {
+        let (mut row, mut said) = (row(1), SupervisorReport { commands, ..said(Phase::Running) });
         change(&mut row, &mut said);
         console.update(&row, said, 5);
     }
@@ -336,9 +336,9 @@ mod tests {
     fn a_stop_takes_back_what_would_move_and_leaves_the_numbers() {
         let mut console = console(Phase::Running);
         console.operator.take_pending();
-        console.order(LoopCommand::Trigger);
+        console.queue(LoopCommand::Trigger);
         console
-            .order(LoopCommand::Request(OperatorRequest { command: Some([7; COMMAND_WORDS]), request: Request::Run }));
+            .queue(LoopCommand::Request(OperatorRequest { command: Some([7; COMMAND_WORDS]), request: Request::Run }));
         console.start_wave(&Settings::still(), true).unwrap();
         console.start_wave(&Settings::still(), false).unwrap();
         assert_eq!(console.command_on_edge([1; COMMAND_WORDS]), Err(Refusal::State), "under a wave");
@@ -367,7 +367,7 @@ mod tests {
         console.outgoing().0.clear();
         // Numbers go on behind what was sent.
         assert_eq!(console.outgoing().1, 3);
-        console.order(LoopCommand::Trigger);
+        console.queue(LoopCommand::Trigger);
         console.stop();
         assert!(console.is_engaged(), "the wave is under way until a tick shows that it is not");
         show(&mut console, 1, |_, _| {});
@@ -395,11 +395,11 @@ mod tests {
         console.operator.set_by_link([1; COMMAND_WORDS]);
         console.start_wave(&still, false).unwrap();
         // What is wanted once it is over goes first: to hold.
-        let orders = console.outgoing().0;
+        let commands = console.outgoing().0;
         assert!(
-            matches!(orders[0], LoopCommand::Request(OperatorRequest { command: Some(command), .. }) if command[0] == 0)
+            matches!(commands[0], LoopCommand::Request(OperatorRequest { command: Some(command), .. }) if command[0] == 0)
         );
-        assert!(matches!(orders[1], LoopCommand::Wave(_)));
+        assert!(matches!(commands[1], LoopCommand::Wave(_)));
         console.stop_wave();
         assert!(matches!(console.outgoing().0.back(), Some(LoopCommand::StopWave)));
     }
@@ -454,23 +454,23 @@ mod tests {
     }
 
     #[test]
-    fn there_is_room_for_so_many_orders_and_for_so_many_ticks() {
+    fn there_is_room_for_so_many_commands_and_for_so_many_ticks() {
         let mut console = console(Phase::Holding);
         assert_eq!(console.arm_recorder(CAPACITY + 1), Err(Refusal::Word { index: 0 }));
         assert_eq!(console.arm_recorder(CAPACITY), Ok(()));
         console.trigger_recorder();
         console.stop_recorder();
-        let orders: Vec<_> = console.outgoing().0.iter().collect();
-        assert!(matches!(orders[..], [LoopCommand::Record(_), LoopCommand::Trigger, LoopCommand::StopRecorder]));
-        for number in 4..=MOST_ORDERS as u32 {
+        let commands: Vec<_> = console.outgoing().0.iter().collect();
+        assert!(matches!(commands[..], [LoopCommand::Record(_), LoopCommand::Trigger, LoopCommand::StopRecorder]));
+        for number in 4..=MOST_COMMANDS as u32 {
             assert!(!console.is_full());
-            assert_eq!(console.order(LoopCommand::Trigger), number);
+            assert_eq!(console.queue(LoopCommand::Trigger), number);
         }
         assert!(console.is_full());
         console.outgoing().0.clear();
         console.take_pending();
         console.take_pending();
-        assert!(matches!(console.outgoing(), (orders, 65) if orders.len() == 1));
+        assert!(matches!(console.outgoing(), (commands, 65) if commands.len() == 1));
         let config = Config::new();
         console.configure(config);
         assert!(matches!(console.outgoing().0.back(), Some(LoopCommand::Configure(_))) && *console.config() == config);

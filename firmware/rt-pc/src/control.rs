@@ -1,7 +1,8 @@
-//! The real-time thread: read, control, write, hand over; no allocation, no lock, no file.
+//! The real-time thread: in each tick it reads the inputs, computes, writes the outputs, and hands the tick's row to other
+//! threads. It does not allocate, lock or use files.
 //!
-//! No control decision is made here: the supervisor decides the reaction to a missed tick, an invalid gauge or a lost
-//! host, which it gets as event bits.
+//! No control decision is made here. A missed tick, an invalid gauge or a lost host is an event bit; the supervisor
+//! decides the reaction.
 
 mod keeper;
 mod setpoints;
@@ -29,10 +30,9 @@ use setpoints::Setpoints;
 
 /// From the start of the loop to its first tick, ns.
 const START_DELAY: u64 = 20_000_000;
-/// A computer that slept this long was suspended, ns.
-const SLEPT: u64 = 1_000_000;
-/// Time without a sign of life of the service after which the operator's link is lost, ns. The service gives one every
-/// few ms.
+/// The computer was suspended if the clock that counts suspension gains more than this on the monotonic clock, ns.
+const SUSPENSION: u64 = 1_000_000;
+/// Time without a heartbeat of the service thread after which the operator's link is lost, ns. Its period is a few ms.
 const SERVICE_TIMEOUT: u64 = 2_000_000_000;
 
 /// Timing of the loop.
@@ -44,8 +44,8 @@ pub struct Timing {
     pub limit: u64,
     /// Ticks without a request after which a link is lost.
     pub silence: u64,
-    /// Time waits for the loop: no tick is skipped, the next one is planned as soon as possible. For simulated
-    /// machines.
+    /// For simulated machines, whose time can wait: after a late tick none is skipped, and the next one starts as soon
+    /// as possible.
     pub elastic: bool,
 }
 
@@ -62,40 +62,41 @@ pub struct Loop<'a, D> {
 }
 
 impl<D: Device> Loop<'_, D> {
-    /// Runs until [`Shared::stop`]; then the amplifiers are off. `account` is the account of the run.
+    /// Runs until [`Shared::stop`], and switches the amplifiers off. `account` collects the timing of the run.
     pub fn run(mut self, account: &mut Account) {
         scheduling::touch_stack();
         let mut machine = machine_at_reset();
         let mut setpoints = Setpoints::new();
-        let Inner { outlets, mut orders, mut players } = self.rings;
+        let Inner { outlets, mut commands, mut players } = self.rings;
         let mut keeper = Keeper::new(outlets, self.tape.take(), self.shared, (&machine, &self.config));
         let mut phase = Phase::Disarmed;
         let mut enabled = false;
-        // Whether an output of the last tick failed.
-        let mut undriven = false;
-        let mut link = Link { number: 0, asked: 0, silence: self.timing.silence };
+        // In the last tick.
+        let mut output_failed = false;
+        let mut link = Link { number: 0, last_request: 0, silence: self.timing.silence };
         let mut count = 0;
         let Timing { period, elastic, .. } = self.timing;
         let mut planned = clock::now() + START_DELAY;
         let mut tick = 0;
+        // Time for which the computer was suspended since boot.
         let mut slept = clock::since_boot().wrapping_sub(clock::now());
         allocation::enter();
         while !self.shared.stop.load(Ordering::Relaxed) {
             clock::sleep_until(planned);
             let woken = clock::now();
             let slept_now = clock::since_boot().wrapping_sub(woken);
-            let suspended = slept_now.wrapping_sub(slept) > SLEPT && slept_now > slept;
+            let suspended = slept_now.wrapping_sub(slept) > SUSPENSION && slept_now > slept;
             slept = slept_now;
-            let over = if elastic { 0 } else { account.arrive(planned, woken, suspended) };
-            planned += over * period;
-            tick += over;
+            let skipped = if elastic { 0 } else { account.arrive(planned, woken, suspended) };
+            planned += skipped * period;
+            tick += skipped;
 
             let mut events = self.standing_events;
-            if over > 0 {
+            if skipped > 0 {
                 events |= MISSED_TICK;
             }
-            // While the PC sleeps, the monotonic clock stops, and no tick counts as skipped.
-            if over > u64::from(STALL_TICKS) || (suspended && !elastic) {
+            // While the PC is suspended, the monotonic clock stops, and no tick counts as skipped.
+            if skipped > u64::from(STALL_TICKS) || (suspended && !elastic) {
                 events |= STALLED;
             }
             let silence = woken.saturating_sub(self.shared.service_alive.load(Ordering::Relaxed));
@@ -105,9 +106,10 @@ impl<D: Device> Loop<'_, D> {
 
             self.device.tick(tick);
             let read = self.device.read();
-            let mut broken = read.is_err();
+            let mut input_failed = read.is_err();
+            // Toggles the heartbeat line, and reads the emergency stop and the amplifiers' fault contact.
             let contacts = self.device.beat();
-            broken |= contacts.is_err();
+            input_failed |= contacts.is_err();
             let contacts = contacts.unwrap_or_default();
             if contacts.stop {
                 events |= STOP;
@@ -115,16 +117,16 @@ impl<D: Device> Loop<'_, D> {
             if contacts.fault {
                 events |= AMPLIFIER;
             }
-            let mut rose = false;
+            let mut rising_edge = false;
             if triggers::INPUT {
                 let line = self.device.input();
-                broken |= line.is_err();
-                rose = setpoints.sense(line);
+                input_failed |= line.is_err();
+                rising_edge = setpoints.sense(line);
             }
             let usage = Usage::of_this_thread();
             let sensed = clock::now();
 
-            if broken || undriven {
+            if input_failed || output_failed {
                 events |= CONVERTER;
             }
             let command = setpoints.next(phase);
@@ -133,12 +135,12 @@ impl<D: Device> Loop<'_, D> {
                     codes.map(|code| sensing::CONVERTER.reading(code)),
                     self.device.wrench().map(|value| value as Real),
                 ),
-                // A reading that failed is invalid: it is passed as NaN.
+                // The supervisor treats NaN as an invalid reading.
                 Err(_) => ([Real::NAN; LEGS], [Real::NAN; LEGS]),
             };
-            // The supervisor ignores it, but every record has it.
-            let seen = if rose { events | EDGE } else { events };
-            let input = measured_input(&command, &gauge, &wrench, setpoints.request(), seen);
+            // The supervisor ignores the edge; it is an event so that records contain it.
+            let events = if rising_edge { events | EDGE } else { events };
+            let input = measured_input(&command, &gauge, &wrench, setpoints.request(), events);
             let output = supervise(&self.config, &mut machine, &input);
             let computed = clock::now();
 
@@ -153,13 +155,13 @@ impl<D: Device> Loop<'_, D> {
                 driven = driven.and(self.device.set(triggers::lines(output.tick.status)));
             }
             if output.amplifier_on && !enabled && driven.is_ok() {
-                // The codes are set before the amplifiers use them. Even after an error they may be on.
+                // Only after the codes are written. Even if this fails, the amplifiers may be on.
                 driven = self.device.enable(true);
                 enabled = true;
             }
-            undriven = driven.is_err();
+            output_failed = driven.is_err();
             let written = clock::now();
-            if broken || driven.is_err() {
+            if input_failed || output_failed {
                 self.shared.device_faults.fetch_add(1, Ordering::Relaxed);
             }
 
@@ -177,7 +179,7 @@ impl<D: Device> Loop<'_, D> {
                 place: place_words(&machine.state),
                 digest,
                 late: account.late().iter().sum(),
-                orders: 0,
+                commands: 0,
                 opens: false,
                 waving: setpoints.waving(),
                 edge: setpoints.edge(),
@@ -189,9 +191,9 @@ impl<D: Device> Loop<'_, D> {
             }
             count += 1;
             let mut configured = false;
-            if let Ok(order) = orders.pop() {
-                keeper.ordered();
-                match order {
+            if let Ok(command) = commands.pop() {
+                keeper.count_command();
+                match command {
                     LoopCommand::Request(wish) => setpoints.accept(wish),
                     LoopCommand::Configure(config) => (self.config, configured) = (config, true),
                     LoopCommand::Wave(wave) => setpoints.start(wave),
@@ -207,7 +209,7 @@ impl<D: Device> Loop<'_, D> {
                 }
             }
             keeper.prepare(&machine, &self.config, count, configured);
-            // Tried again after the next tick if there is no room now.
+            // If the ring is full, the player is returned after a later tick.
             if let Some(Err(rtrb::PushError::Full(player))) = setpoints.take_player().map(|player| players.push(player))
             {
                 setpoints.put_player(player);
@@ -222,7 +224,7 @@ impl<D: Device> Loop<'_, D> {
             }
             tick += 1;
         }
-        // Twice: a bus that failed once may work now. There is nowhere to report a failure here.
+        // A second attempt, because a bus that failed once may work now. A failure cannot be reported any more.
         let _ = self.device.enable(false).or_else(|_| self.device.enable(false));
         keeper.finish();
         allocation::leave();
@@ -232,30 +234,31 @@ impl<D: Device> Loop<'_, D> {
 
 /// Whether the host at the other end of a link is still there.
 struct Link {
-    /// Number of the last request; 0 if no host's silence matters.
+    /// Number of the last request; 0 if no host is in control, whose silence would matter.
     number: u64,
     /// Tick of that request.
-    asked: u64,
+    last_request: u64,
     /// Ticks of silence that are tolerated.
     silence: u64,
 }
 
 impl Link {
-    /// `number` is that of the last request, `tick` is now: skipped ticks count as silence, too.
+    /// Whether the host is silent for too long at this `tick`, if the last request has this `number`. Skipped ticks count
+    /// as silence, too.
     fn is_lost(&mut self, number: u64, tick: u64) -> bool {
         if number != self.number {
-            (self.number, self.asked) = (number, tick);
+            (self.number, self.last_request) = (number, tick);
         }
-        number != 0 && tick - self.asked > self.silence
+        number != 0 && tick - self.last_request > self.silence
     }
 }
 
-/// The outputs of a tick in a record.
+/// The outputs of a tick as a recorder stores them.
 fn row_of(output: &MachineOutput) -> recorder::Row {
     recorder::Row { codes: output.tick.dac_code, status: output.tick.status, supervisor: output.supervisor_word() }
 }
 
-/// The event bit for tables or settings that have changed.
+/// The event bit of an integrity check: tables or settings in memory are damaged unless they are `intact`.
 #[must_use]
 pub fn integrity_event(intact: bool) -> u32 {
     if intact { 0 } else { INTEGRITY }
@@ -329,8 +332,8 @@ mod tests {
         assert_eq!(bench.calls.last().unwrap().1, Call::Enable(false), "off at the end");
         assert!(bench.shared.ended.load(Ordering::Acquire));
         // Each wish is one order, which is counted from the next row on.
-        let orders: Vec<u32> = rows.iter().map(|row| row.orders).collect();
-        assert!(orders[..2] == [0, 0] && orders[2] == 1 && orders.is_sorted() && orders[rows.len() - 1] == 3);
+        let commands: Vec<u32> = rows.iter().map(|row| row.commands).collect();
+        assert!(commands[..2] == [0, 0] && commands[2] == 1 && commands.is_sorted() && commands[rows.len() - 1] == 3);
         assert_eq!(phase(rows.last().unwrap()), Phase::Disarmed);
         assert_eq!(bench.sets, if triggers::LINES == 0 { 0 } else { rows.len() });
         assert_eq!(bench.shared.device_faults.load(Ordering::Relaxed), 0);
@@ -598,16 +601,16 @@ mod tests {
     fn a_recorder_goes_to_the_loop_and_comes_back_with_its_ticks() {
         let mut tape = Some(Capture::new(None).unwrap().1);
         let (mut bench, _) = run(FAST, move |bench| match bench.tick {
-            2 => bench.order(LoopCommand::Tape(tape.take().unwrap())),
-            10 => bench.order(LoopCommand::Trigger),
-            20 => bench.order(LoopCommand::Record(recorder::Settings {
+            2 => bench.queue(LoopCommand::Tape(tape.take().unwrap())),
+            10 => bench.queue(LoopCommand::Trigger),
+            20 => bench.queue(LoopCommand::Record(recorder::Settings {
                 streaming: false,
                 trigger: recorder::Trigger { fault: true, phase_change: false },
                 after: 5,
                 decimation: 1,
                 digest_every: 1,
             })),
-            30 => bench.order(LoopCommand::StopRecorder),
+            30 => bench.queue(LoopCommand::StopRecorder),
             40 => bench.stop(),
             _ => {}
         });
@@ -632,7 +635,7 @@ mod tests {
     #[test]
     fn a_wave_is_followed_while_the_machine_runs_and_ends_with_that() {
         let (bench, _) = run(FAST, |bench| match bench.arm_and_run() {
-            Some(10) => bench.order(LoopCommand::Wave(wave())),
+            Some(10) => bench.queue(LoopCommand::Wave(wave())),
             Some(20) => bench.ask(Request::Hold),
             Some(80) => bench.stop(),
             _ => {}

@@ -17,7 +17,7 @@ use crate::words::Command;
 /// Rows between the threads: 0.8 s at 10 kHz.
 const ROWS: usize = 8192;
 /// Commands between the threads; the loop takes one a tick.
-const ORDERS: usize = 64;
+const COMMANDS: usize = 64;
 /// States between the threads, one for [`SNAPSHOT_EVERY`] rows and one for every change of the settings.
 const SNAPSHOTS: usize = 16;
 /// Rows per block of a run's record.
@@ -45,7 +45,7 @@ pub struct Row {
     /// Ticks before it that were late.
     pub late: u64,
     /// Commands executed before it.
-    pub orders: u32,
+    pub commands: u32,
     /// A block of the record begins with it: its [`Snapshot`] was handed over before.
     pub opens: bool,
     /// Whether the set-point is a wave's.
@@ -192,7 +192,7 @@ pub struct Outlets {
 /// The loop's ends of the rings.
 pub struct Inner {
     pub outlets: Outlets,
-    pub orders: Consumer<LoopCommand>,
+    pub commands: Consumer<LoopCommand>,
     /// The player, when its pass is over.
     pub players: Producer<Player>,
 }
@@ -201,7 +201,7 @@ pub struct Outer {
     pub rows: Consumer<Row>,
     pub snapshots: Consumer<Snapshot>,
     pub tapes: Consumer<(Tape, u32)>,
-    pub orders: Producer<LoopCommand>,
+    pub commands: Producer<LoopCommand>,
     pub players: Consumer<Player>,
 }
 
@@ -213,10 +213,10 @@ pub fn rings(records: bool) -> (Inner, Outer) {
     let (tapes, tapes_out) = RingBuffer::new(2);
     // As of tapes.
     let (players, players_out) = RingBuffer::new(2);
-    let (orders, orders_in) = RingBuffer::new(ORDERS);
+    let (outgoing, commands) = RingBuffer::new(COMMANDS);
     (
-        Inner { outlets: Outlets { rows, snapshots: records.then_some(snapshots), tapes }, orders: orders_in, players },
-        Outer { rows: rows_out, snapshots: snapshots_out, tapes: tapes_out, orders, players: players_out },
+        Inner { outlets: Outlets { rows, snapshots: records.then_some(snapshots), tapes }, commands, players },
+        Outer { rows: rows_out, snapshots: snapshots_out, tapes: tapes_out, commands: outgoing, players: players_out },
     )
 }
 
@@ -261,7 +261,7 @@ mod tests {
         for records in [true, false] {
             let (inner, outer) = rings(records);
             assert_eq!(inner.outlets.snapshots.is_some(), records);
-            assert!(inner.outlets.rows.slots() >= SNAPSHOT_EVERY as usize && outer.orders.slots() > 0);
+            assert!(inner.outlets.rows.slots() >= SNAPSHOT_EVERY as usize && outer.commands.slots() > 0);
         }
     }
 }

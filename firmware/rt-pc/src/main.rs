@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! real-time thread   sleep to the tick → gauges → supervise → amplifiers → hand over     control.rs, control/
-//!        │ rows, states, recorder              ▲ orders              rings, never wait    handover.rs
+//!        │ rows, states, recorder              ▲ commands            rings, never wait    handover.rs
 //!        ▼                                     │
 //! main thread        record to a file, link, plan, signals                               service.rs, console.rs, operator.rs
 //! ```

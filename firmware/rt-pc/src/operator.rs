@@ -30,7 +30,7 @@ pub struct SupervisorReport {
     pub status: u32,
     pub tick: u64,
     /// Number of commands that the loop had executed by then.
-    pub orders: u32,
+    pub commands: u32,
     /// Whether the set-point was a wave's.
     pub waving: bool,
     /// Number of late ticks so far.
@@ -410,7 +410,7 @@ mod tests {
             on,
             status: 0,
             tick: 7,
-            orders: 0,
+            commands: 0,
             waving: false,
             late: 0,
         }
@@ -489,7 +489,7 @@ mod tests {
         let mut operator = operator();
         operator.seen(A, 0);
         operator.left(A, None);
-        assert!(!operator.host_in_control(1) && operator.heartbeat() == 0, "one that only looks has no orders");
+        assert!(!operator.host_in_control(1) && operator.heartbeat() == 0, "one that only looks is not in control");
         operator.take_for_host(A, 10).unwrap();
         operator.ask_by_link(Request::Run, A);
         assert!(operator.heartbeat() > 0 && operator.take_pending().unwrap().request == Request::Run);

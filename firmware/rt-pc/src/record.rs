@@ -89,7 +89,7 @@ impl Writer {
             };
             let mut changed = false;
             // Order numbers wrap around.
-            let taken = |order: u32| (row.orders.wrapping_sub(order) as i32) >= 0;
+            let taken = |order: u32| (row.commands.wrapping_sub(order) as i32) >= 0;
             while let Some((_, config)) = self.configs.front().filter(|(order, _)| taken(*order)) {
                 (self.config, changed) = (*config, true);
                 self.configs.pop_front();

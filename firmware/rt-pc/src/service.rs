@@ -107,15 +107,15 @@ impl Service<'_> {
     /// Sends queued commands, as far as there is room.
     fn send(&mut self) {
         self.console.take_pending();
-        let (orders, mut number) = self.console.outgoing();
-        while self.rings.orders.slots() > 0 {
-            let Some(order) = orders.pop_front() else { break };
+        let (commands, mut number) = self.console.outgoing();
+        while self.rings.commands.slots() > 0 {
+            let Some(order) = commands.pop_front() else { break };
             if let (LoopCommand::Configure(config), Some((_, writer))) = (&order, &mut self.record) {
                 writer.configured(number, config);
             }
             number = number.wrapping_add(1);
             // There is room, and nothing else sends commands.
-            let _ = self.rings.orders.push(order);
+            let _ = self.rings.commands.push(order);
         }
     }
 
@@ -161,7 +161,7 @@ impl Service<'_> {
         // After the rows, which have older information on the recorder.
         while let Ok((tape, taken)) = self.rings.tapes.pop() {
             if let Some(order) = self.console.capture.receive(tape, taken) {
-                self.console.order(order);
+                self.console.queue(order);
             }
         }
         while let Ok(player) = self.rings.players.pop() {
@@ -180,7 +180,7 @@ fn said(row: &Row) -> SupervisorReport {
         on: word >> 16 & 1 == 1,
         status: row.output.status,
         tick: row.tick,
-        orders: row.orders,
+        commands: row.commands,
         waving: row.waving,
         late: row.late,
     }
@@ -230,11 +230,11 @@ mod tests {
         {
             for finding in [0, 5] {
                 row.output.supervisor = word(phase.word() as u32, cause, on, finding);
-                (row.orders, row.waving, row.late, row.output.status) = (4, on, 3, 77);
+                (row.commands, row.waving, row.late, row.output.status) = (4, on, 3, 77);
                 let found = said(&row);
                 assert_eq!((found.phase, found.cause, found.on), (phase, cause, on));
                 assert_eq!(found.finding, Finding::of_word(finding));
-                assert_eq!((found.tick, found.orders, found.waving, found.late, found.status), (9, 4, on, 3, 77));
+                assert_eq!((found.tick, found.commands, found.waving, found.late, found.status), (9, 4, on, 3, 77));
             }
         }
         row.output.supervisor = 0xff;
@@ -300,20 +300,20 @@ mod tests {
     fn orders_go_out_in_their_order_as_far_as_there_is_room() {
         let shared = Shared::default();
         let (mut service, mut inner, _) = service(&shared, None, None);
-        let room = service.rings.orders.slots();
+        let room = service.rings.commands.slots();
         for _ in 0..room - 1 {
-            service.console.order(LoopCommand::Trigger);
+            service.console.queue(LoopCommand::Trigger);
         }
         service.console.configure(Config::new());
         service.console.operator.ramp_down(0);
         service.send();
         // The wish came last, and finds no room.
-        assert_eq!((inner.orders.slots(), service.console.outgoing().0.len()), (room, 1));
-        assert!(matches!(inner.orders.pop(), Ok(LoopCommand::Trigger)));
+        assert_eq!((inner.commands.slots(), service.console.outgoing().0.len()), (room, 1));
+        assert!(matches!(inner.commands.pop(), Ok(LoopCommand::Trigger)));
         service.send();
-        let orders: Vec<_> = std::iter::from_fn(|| inner.orders.pop().ok()).collect();
+        let commands: Vec<_> = std::iter::from_fn(|| inner.commands.pop().ok()).collect();
         assert!(
-            matches!(orders[room - 2..], [LoopCommand::Configure(_), LoopCommand::Request(wish)] if wish.request == Request::RampDown)
+            matches!(commands[room - 2..], [LoopCommand::Configure(_), LoopCommand::Request(wish)] if wish.request == Request::RampDown)
         );
         assert!(service.console.outgoing().0.is_empty());
     }
@@ -332,12 +332,12 @@ mod tests {
         let state = [0; MACHINE_STATE_WORDS];
         let mut outcome = Outcome::default();
         // The order was taken before the second of three blocks.
-        for (block, orders) in [(0, 0), (1, 1), (2, 1)] {
+        for (block, commands) in [(0, 0), (1, 1), (2, 1)] {
             let count = block * u64::from(SNAPSHOT_EVERY);
             inner.outlets.snapshots.as_mut().unwrap().push(Snapshot { count, digest: 1, state }).unwrap();
             for tick in count..count + u64::from(SNAPSHOT_EVERY) {
                 let mut row = row(tick);
-                (row.opens, row.orders) = (tick == count, orders);
+                (row.opens, row.commands) = (tick == count, commands);
                 inner.outlets.rows.push(row).unwrap();
             }
             service.drain(&mut outcome, 0);
@@ -376,7 +376,7 @@ mod tests {
         let machine = std::thread::spawn(move || {
             let (mut asked, mut tick) = (Request::None, 0);
             while !shared.stop.load(Ordering::Relaxed) && clock::now() < start + 5 * SECOND {
-                while let Ok(order) = inner.orders.pop() {
+                while let Ok(order) = inner.commands.pop() {
                     if let LoopCommand::Request(wish) = order {
                         asked = wish.request;
                     }

@@ -273,7 +273,7 @@ mod tests {
         finding: Finding::None,
         on: false,
         status: 0,
-        orders: 0,
+        commands: 0,
         waving: false,
         late: 0,
     };

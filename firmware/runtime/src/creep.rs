@@ -14,7 +14,7 @@
 //! # Example
 //!
 //! With the table of [`crate::everett`] and one creep operator, g = 1/2 and w = 1/4: under a held drive the leg creeps
-//! from 6 µm towards 6 (1 + 1/4) = 7.5 µm, half of the rest in each tick.
+//! from 6 µm towards 6 (1 + 1/4) = 7.5 µm, half of the remaining distance in each tick.
 //!
 //! ```
 //! use specgen_runtime::{Creep, CreepEverett, CreepMemory, Everett};
@@ -43,9 +43,9 @@ pub struct Creep<T, const K: usize> {
     pub gains: [T; K],
     /// w_j ≥ 0.
     pub weights: [T; K],
-    /// w_j (1 − g_j).
+    /// w_j (1 − g_j): weight of the present x_j in y at the end of the tick.
     pub carried: [T; K],
-    /// 1 + Σ w_j g_j.
+    /// 1 + Σ w_j g_j: weight of f in y at the end of the tick.
     pub direct: T,
 }
 
@@ -57,14 +57,24 @@ impl<T: Real, const K: usize> Creep<T, K> {
         crc.reals(&self.carried);
         crc.reals(&[self.direct]);
     }
+
+    /// `displacement` without the part that the present `states` contribute at the end of the next tick, m.
+    #[inline(always)]
+    pub(crate) fn without_carried(&self, states: &[T; K], displacement: T) -> T {
+        let mut remainder = displacement;
+        for (state, carried) in states.iter().zip(&self.carried) {
+            remainder = remainder - *carried * *state;
+        }
+        remainder
+    }
 }
 
 /// Everett function of one leg, followed by creep.
 #[derive(Debug, Clone, Copy)]
 pub struct CreepEverett<'a, T, G, const K: usize> {
-    /// The static model.
+    /// Everett function of the static model.
     pub still: G,
-    /// What follows it.
+    /// The creep that follows.
     pub creep: &'a Creep<T, K>,
 }
 
@@ -72,7 +82,7 @@ crate::state! { |words|
     /// Reversal memory and creep states of one leg. Reset: at rest, drive 0 after negative saturation, no creep left.
     pub struct CreepMemory<T, CAP, K>[T: Real, const CAP: usize, const K: usize] {
         memory: ReversalMemory<T, CAP> = ReversalMemory::new(), part;
-        /// x_j, m.
+        /// x_j: creep states, m.
         states: [T; K] = [T::ZERO; K], numbers(words.sizes().leg);
         /// y at the end of the tick, m.
         displacement: T = T::ZERO, number(words.sizes().leg);
@@ -80,7 +90,7 @@ crate::state! { |words|
 }
 
 impl<T: Real, const CAP: usize, const K: usize> CreepMemory<T, CAP, K> {
-    /// At a drive just reached from below, see [`ReversalMemory::risen`]; its creep is still to come.
+    /// The state at a drive just reached from below, see [`ReversalMemory::risen`], before any creep.
     #[must_use]
     pub const fn risen(drive: T, displacement: T) -> Self {
         let mut memory = Self::new();
@@ -89,19 +99,7 @@ impl<T: Real, const CAP: usize, const K: usize> CreepMemory<T, CAP, K> {
         memory
     }
 
-    /// The drive last applied, cells.
-    #[inline]
-    #[must_use]
-    pub fn drive(&self) -> T {
-        self.memory.drive()
-    }
-
-    /// The displacement that the model gives at the end of the tick over which the last drive is held, m.
-    #[inline]
-    #[must_use]
-    pub fn displacement(&self) -> T {
-        self.displacement
-    }
+    crate::memory::present_point!();
 
     /// x_j, m: within 0 and the full displacement of the table.
     #[must_use]
@@ -127,24 +125,20 @@ impl<T: Real, const CAP: usize, const K: usize> CreepMemory<T, CAP, K> {
     #[inline]
     #[must_use]
     pub fn solve<G: Grid<T>>(&self, table: &CreepEverett<'_, T, G, K>, displacement: T) -> T {
-        self.memory.solve(&table.still, self.still_part(table, displacement))
+        self.memory.solve(&table.still, self.static_demand(table, displacement))
     }
 
     /// Whether the table reaches `displacement` (m) from the present state.
     #[inline]
     #[must_use]
     pub fn reaches<G: Grid<T>>(&self, table: &CreepEverett<'_, T, G, K>, displacement: T) -> bool {
-        let still = self.still_part(table, displacement);
+        let still = self.static_demand(table, displacement);
         still >= T::ZERO && still <= table.still.full_displacement()
     }
 
     /// f: output of the static model that gives `displacement` at the end of the next tick, m; not limited.
     #[inline]
-    fn still_part<G: Grid<T>>(&self, table: &CreepEverett<'_, T, G, K>, displacement: T) -> T {
-        let mut rest = displacement;
-        for (state, carried) in self.states.iter().zip(&table.creep.carried) {
-            rest = rest - *carried * *state;
-        }
-        rest / table.creep.direct
+    fn static_demand<G: Grid<T>>(&self, table: &CreepEverett<'_, T, G, K>, displacement: T) -> T {
+        table.creep.without_carried(&self.states, displacement) / table.creep.direct
     }
 }

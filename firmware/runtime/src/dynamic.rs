@@ -40,7 +40,7 @@ use crate::real::{Real, saturate};
 /// The two Everett functions of one leg.
 #[derive(Debug, Clone, Copy)]
 pub struct DynamicEverett<T, G> {
-    /// Of μ₀, m.
+    /// Of μ₀, the static part, m.
     pub still: G,
     /// Of μ₁, m per cell a tick; of either sign, not monotone. Only its values are used.
     pub rate: G,
@@ -87,19 +87,7 @@ impl<T: Real, const CAP: usize> DynamicMemory<T, CAP> {
         memory
     }
 
-    /// The drive last applied, cells.
-    #[inline]
-    #[must_use]
-    pub fn drive(&self) -> T {
-        self.memory.drive()
-    }
-
-    /// Displacement requested in the last tick, see [`DynamicMemory::apply`], m.
-    #[inline]
-    #[must_use]
-    pub fn displacement(&self) -> T {
-        self.displacement
-    }
+    crate::memory::present_point!();
 
     /// Whether the last [`DynamicMemory::solve`] returned the static inverse because (6) could not be inverted safely.
     #[inline]
@@ -115,8 +103,8 @@ impl<T: Real, const CAP: usize> DynamicMemory<T, CAP> {
         displacement >= T::ZERO && displacement <= table.still.full_displacement()
     }
 
-    /// One tick that ends at `drive` (cells, finite, limited to 0..=N). Returns the requested displacement, m: h, or Γ₀
-    /// if the last inverse was the static one. A gauge must be compared with the model that was inverted. Otherwise a
+    /// One tick that ends at `drive` (cells, finite, limited to 0..=N). Returns the displacement of the model, m: h, or
+    /// Γ₀ if the last inverse was the static one. A gauge must be compared with the model that was inverted. Otherwise a
     /// rate term too large to invert would return through the adaptation.
     #[inline]
     pub fn apply<G: Grid<T>>(&mut self, table: &DynamicEverett<T, G>, drive: T) -> T {
@@ -125,14 +113,14 @@ impl<T: Real, const CAP: usize> DynamicMemory<T, CAP> {
         if drive != last {
             let (dropped, depth) = (self.memory.dropped(), self.memory.depth());
             let branch = self.memory.origin(drive);
-            let at_start = if branch.place < depth { self.rate_at(branch.place) } else { self.rate };
+            let at_start = if branch.top < depth { self.rate_at(branch.top) } else { self.rate };
             self.memory.apply(&table.still, drive);
             if self.memory.dropped() != dropped {
                 self.restore(table);
             } else if drive <= T::ZERO {
                 self.rate = T::ZERO;
             } else {
-                self.rate_at[if branch.place < CAP { branch.place } else { CAP - 1 }] = at_start;
+                self.rate_at[if branch.top < CAP { branch.top } else { CAP - 1 }] = at_start;
                 self.rate = along(&table.rate, branch.start, at_start, drive);
             }
         }
@@ -227,7 +215,7 @@ impl<T: Real, const CAP: usize> DynamicMemory<T, CAP> {
         }
         let branch = self.memory.origin(drive);
         let still = along(&table.still, branch.start, branch.at_start, drive);
-        let at_start = if branch.place < self.memory.depth() { self.rate_at(branch.place) } else { self.rate };
+        let at_start = if branch.top < self.memory.depth() { self.rate_at(branch.top) } else { self.rate };
         let rate = along(&table.rate, branch.start, at_start, drive);
         Point { drive, gain: still - self.memory.displacement(), rate_term: (drive - last) * rate }
     }
@@ -243,12 +231,12 @@ impl<T: Real, const CAP: usize> DynamicMemory<T, CAP> {
                 break;
             }
             if k > 0 {
-                at = along(&table.rate, self.memory.extremum_at(k - 1), at, self.memory.extremum_at(k));
+                at = along(&table.rate, self.memory.extremum(k - 1), at, self.memory.extremum(k));
             }
             self.rate_at[k] = at;
         }
         let top = if depth > 0 { depth - 1 } else { 0 };
-        self.rate = along(&table.rate, self.memory.extremum_at(top), at, self.memory.drive());
+        self.rate = along(&table.rate, self.memory.extremum(top), at, self.memory.drive());
     }
 
     /// Bounded read.

@@ -1,7 +1,7 @@
 //! Reversal memory: the Preisach model online, forward and inverse, in bounded memory.
 //!
-//! The state of a Preisach model is the staircase of past extrema that later drives have not wiped out. With extrema p₀
-//! < p₂ < … (minima) and p₁ > p₃ > … (maxima), p₀ being negative saturation, and f_k the displacement at p_k,
+//! The state of a Preisach model is the staircase of past extrema that later drives have not wiped out: minima
+//! p₀ < p₂ < … and maxima p₁ > p₃ > …, where p₀ is negative saturation. f_k is the displacement at p_k.
 //!
 //! ```text
 //! rising  from a minimum p_k:  f(x) = f_k + E(x, p_k)     until x ≥ p_{k−1}, which wipes p_{k−1} and p_k out
@@ -43,7 +43,7 @@ crate::state! { |words|
     /// Reset state: drive 0 after negative saturation, displacement 0. A real leg reaches it by a sweep to the upper
     /// voltage limit and back.
     pub struct ReversalMemory<T, CAP>[T: Real, const CAP: usize] {
-        /// Stored extrema, 1..=CAP. The unused room after them is zero in the words of a state.
+        /// Number of stored extrema, 1..=CAP. A snapshot has zeros for the others.
         len: usize = { let () = Self::FITS; 1 }, place(words.sizes().kept(CAP)) if *len > 0;
         /// Pairs dropped because the memory was full.
         dropped: u32 = 0, tally;
@@ -73,25 +73,47 @@ fn is_staircase<T: Real>(extrema: &[T], drive: T, grid: T) -> bool {
 /// Start of a branch.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Origin<T> {
-    /// Index of its extremum; [`ReversalMemory::depth`] if it starts at the present point, which would become one.
-    pub(crate) place: usize,
+    /// Index of the extremum there; [`ReversalMemory::depth`] if it is the present point, which would become one.
+    pub(crate) top: usize,
     /// Drive there, cells.
     pub(crate) start: T,
     /// Displacement there, m.
     pub(crate) at_start: T,
 }
 
-/// A candidate branch: the result of a look-up, for the drive that is then applied.
+/// The branch of a solution. It is kept so that applying the drive does not look the table up again.
 #[derive(Clone, Copy)]
 struct Branch<T> {
-    /// Index of the extremum that it starts from; `len` if it starts at the present point.
+    /// As [`Origin::top`].
     top: usize,
-    /// Displacement there.
+    /// Displacement at its start, m.
     at_start: T,
+    /// Its segment in the cell of the solution.
     line: Line<T>,
 }
 
+/// What a model with a reversal memory shows of its last tick: methods of its `impl`.
+macro_rules! present_point {
+    () => {
+        /// The drive last applied, cells.
+        #[inline]
+        #[must_use]
+        pub fn drive(&self) -> T {
+            self.memory.drive()
+        }
+
+        /// The displacement that the model gives at the end of the tick over which the last drive is held, m.
+        #[inline]
+        #[must_use]
+        pub fn displacement(&self) -> T {
+            self.displacement
+        }
+    };
+}
+pub(crate) use present_point;
+
 impl<T: Real, const CAP: usize> ReversalMemory<T, CAP> {
+    /// Evaluated by `new`, so that a smaller `CAP` does not compile.
     const FITS: () = assert!(CAP >= 4, "a reversal memory needs room for a loop within a loop");
 
     /// The state after a rise from negative saturation to `drive` (cells, 0..=N), where the model gives `displacement`
@@ -174,14 +196,14 @@ impl<T: Real, const CAP: usize> ReversalMemory<T, CAP> {
     #[inline]
     #[must_use]
     pub fn solve<G: Grid<T>>(&self, table: &G, displacement: T) -> T {
-        let wanted = table.within_reach(displacement);
-        if wanted == self.displacement {
+        let target = table.within_reach(displacement);
+        if target == self.displacement {
             return self.drive;
         }
-        if wanted > self.displacement {
-            self.find::<true, G>(table, wanted).0
+        if target > self.displacement {
+            self.solve_branch::<true, G>(table, target).0
         } else {
-            self.find::<false, G>(table, wanted).0
+            self.solve_branch::<false, G>(table, target).0
         }
     }
 
@@ -195,42 +217,42 @@ impl<T: Real, const CAP: usize> ReversalMemory<T, CAP> {
     /// [`ReversalMemory::follow`] for a displacement (m, finite) that may be out of the table's range. Returns whether
     /// it was.
     #[inline(always)]
-    pub fn follow_within<G: Grid<T>>(&mut self, table: &G, displacement: T, permitted: impl FnOnce(T) -> T) -> bool {
+    pub fn follow_within<G: Grid<T>>(&mut self, table: &G, displacement: T, permit: impl FnOnce(T) -> T) -> bool {
         let reached = self.reaches(table, displacement);
-        self.follow(table, if reached { displacement } else { table.within_reach(displacement) }, permitted);
+        self.follow(table, if reached { displacement } else { table.within_reach(displacement) }, permit);
         !reached
     }
 
-    /// The fast path of [`ReversalMemory::follow_within`]: the table reaches `displacement` (m, finite), the solution
-    /// lies in the cell of the present drive, and `permitted` leaves it in that cell. Returns whether that was so; if
-    /// not, nothing has changed. `last` must belong to this table.
+    /// The fast path of [`ReversalMemory::follow_within`], without a search. It applies if the table reaches
+    /// `displacement` (m, finite), the solution lies in the cell of the present drive, and `permit` leaves it there.
+    /// Returns whether it applies; if not, nothing has changed. `last` must belong to this table.
     #[inline(always)]
     pub fn track<G: Grid<T>>(
         &mut self,
         table: &G,
         last: &mut LastLine<T>,
         displacement: T,
-        permitted: impl FnOnce(T) -> Option<T>,
+        permit: impl FnOnce(T) -> Option<T>,
     ) -> bool {
         if !self.reaches(table, displacement) {
             return false;
         }
         let cell = table.cell(self.drive);
         if displacement > self.displacement {
-            let (start, at_start, top) = self.start::<true>(displacement);
+            let (start, at_start, top) = self.branch_start::<true>(displacement);
             let branch = Branch { top, at_start, line: last.of::<true, G>(table, start, cell) };
             match branch.line.within::<true>(displacement - at_start) {
                 Some(drive) => {
-                    permitted(drive).is_some_and(|drive| self.take_or_apply::<true, G>(table, &branch, drive))
+                    permit(drive).is_some_and(|drive| self.apply_near_segment::<true, G>(table, &branch, drive))
                 }
                 None => false,
             }
         } else if displacement < self.displacement {
-            let (start, at_start, top) = self.start::<false>(displacement);
+            let (start, at_start, top) = self.branch_start::<false>(displacement);
             let branch = Branch { top, at_start, line: last.of::<false, G>(table, start, cell) };
             match branch.line.within::<false>(at_start - displacement) {
                 Some(drive) => {
-                    permitted(drive).is_some_and(|drive| self.take_or_apply::<false, G>(table, &branch, drive))
+                    permit(drive).is_some_and(|drive| self.apply_near_segment::<false, G>(table, &branch, drive))
                 }
                 None => false,
             }
@@ -240,37 +262,36 @@ impl<T: Real, const CAP: usize> ReversalMemory<T, CAP> {
     }
 
     /// Γ⁻¹ and Γ in one: solves for `displacement`, which must be within the range of the table, and applies the drive
-    /// that `permitted` makes of the solution (finite). `permitted` is called once.
+    /// (finite) to which `permit` limits and rounds the solution. `permit` is called once.
     ///
-    /// Bit-identical to [`ReversalMemory::solve`] followed by [`ReversalMemory::apply`]. A permitted drive differs
-    /// from the solution by a fraction of a cell. It usually lies on the same segment of the branch, and then nothing
-    /// is looked up twice.
+    /// Bit-identical to [`ReversalMemory::solve`] followed by [`ReversalMemory::apply`], but faster: a permitted drive
+    /// usually lies on the same segment of the branch as the solution, and then nothing is looked up twice.
     #[inline(always)]
-    pub fn follow<G: Grid<T>>(&mut self, table: &G, displacement: T, permitted: impl FnOnce(T) -> T) {
+    pub fn follow<G: Grid<T>>(&mut self, table: &G, displacement: T, permit: impl FnOnce(T) -> T) {
         let drive = if displacement > self.displacement {
-            let (solution, branch) = self.find::<true, G>(table, displacement);
-            let drive = permitted(solution);
-            if self.take::<true, G>(table, &branch, drive) {
+            let (solution, branch) = self.solve_branch::<true, G>(table, displacement);
+            let drive = permit(solution);
+            if self.apply_on_segment::<true, G>(table, &branch, drive) {
                 return;
             }
             drive
         } else if displacement < self.displacement {
-            let (solution, branch) = self.find::<false, G>(table, displacement);
-            let drive = permitted(solution);
-            if self.take::<false, G>(table, &branch, drive) {
+            let (solution, branch) = self.solve_branch::<false, G>(table, displacement);
+            let drive = permit(solution);
+            if self.apply_on_segment::<false, G>(table, &branch, drive) {
                 return;
             }
             drive
         } else {
-            permitted(self.drive)
+            permit(self.drive)
         };
         self.apply(table, drive);
     }
 
-    /// Applies a drive that usually lies on the branch. Always returns true.
+    /// Applies a drive that usually lies on the segment of a branch. Always returns true.
     #[inline(always)]
-    fn take_or_apply<const RISING: bool, G: Grid<T>>(&mut self, table: &G, branch: &Branch<T>, drive: T) -> bool {
-        if !self.take::<RISING, G>(table, branch, drive) {
+    fn apply_near_segment<const RISING: bool, G: Grid<T>>(&mut self, table: &G, branch: &Branch<T>, drive: T) -> bool {
+        if !self.apply_on_segment::<RISING, G>(table, branch, drive) {
             self.apply_anew(table, drive);
         }
         true
@@ -283,25 +304,24 @@ impl<T: Real, const CAP: usize> ReversalMemory<T, CAP> {
         self.apply(table, drive);
     }
 
-    /// Applies a drive if it lies on the segment of a branch that [`ReversalMemory::find`] gave, and wipes out what the
-    /// solution wipes out. Returns whether it does.
+    /// Applies a drive if it lies on the segment of a branch and wipes out the same extrema as the solution. Returns
+    /// whether both hold; if not, nothing has changed.
     #[inline(always)]
-    fn take<const RISING: bool, G: Grid<T>>(&mut self, table: &G, branch: &Branch<T>, drive: T) -> bool {
+    fn apply_on_segment<const RISING: bool, G: Grid<T>>(&mut self, table: &G, branch: &Branch<T>, drive: T) -> bool {
         let Branch { top, at_start, line } = *branch;
         let onward = if RISING { drive > self.drive } else { drive < self.drive };
         // If the memory is full, a new extremum may drop another.
         if !onward || !line.holds(drive) || self.len >= table.capacity(CAP) {
             return drive == self.drive;
         }
-        // Loops that the solution leaves are wiped out only if the drive leaves them, too. The outermost of them
-        // decides.
+        // The drive must leave the loops that the solution leaves. It does if it leaves the outermost of them.
         if top + 1 < self.len {
             let inner = self.extremum(top + 1);
             if if RISING { drive < inner } else { drive > inner } {
                 return false;
             }
         }
-        // A fall from the first maximum ends at p₀, which wipes out everything.
+        // It must not leave more loops. A fall from the first maximum p₁ can: at p₀ it wipes out everything.
         if top >= if RISING { 2 } else { 1 } {
             let bound = self.extremum(top - 1);
             if if RISING { drive >= bound } else { drive <= bound } {
@@ -320,22 +340,21 @@ impl<T: Real, const CAP: usize> ReversalMemory<T, CAP> {
         true
     }
 
-    /// Start of the branch to a displacement above the present one, or below it: drive, displacement, and the number of
-    /// extrema below it.
+    /// Start of the branch to a displacement above the present one (`RISING`), or below it: drive, displacement and
+    /// [`Origin::top`]. Like [`ReversalMemory::origin`], but for a displacement.
     #[inline(always)]
-    fn start<const RISING: bool>(&self, wanted: T) -> (T, T, usize) {
-        // The branch starts at the last extremum if the direction is unchanged, else at the present drive. `top` is the
-        // number of extrema below that start.
+    fn branch_start<const RISING: bool>(&self, target: T) -> (T, T, usize) {
+        // The branch starts at the last extremum if the direction is unchanged, else at the present drive.
         let (mut start, mut at_start, mut top) = if RISING == self.is_rising() {
             let top = self.len - 1;
             (self.extremum(top), self.displacement_at(top), top)
         } else {
             (self.drive, self.displacement, self.len)
         };
-        // Walk outwards: if the displacement leaves the inner loop of a pair, the pair is (or would be) wiped out.
+        // Walk outwards: a target beyond the loop of a pair of extrema wipes the pair out.
         while top >= 2 {
             let bound = self.displacement_at(top - 1);
-            let leaves = if RISING { wanted >= bound } else { wanted <= bound };
+            let leaves = if RISING { target >= bound } else { target <= bound };
             if !leaves {
                 break;
             }
@@ -346,14 +365,14 @@ impl<T: Real, const CAP: usize> ReversalMemory<T, CAP> {
         (start, at_start, top)
     }
 
-    /// The drive for a displacement above the present one, or below it, and the branch that leads there.
+    /// The drive for a displacement above the present one (`RISING`), or below it, and the branch that leads there.
     #[inline(always)]
-    fn find<const RISING: bool, G: Grid<T>>(&self, table: &G, wanted: T) -> (T, Branch<T>) {
-        let (start, at_start, top) = self.start::<RISING>(wanted);
+    fn solve_branch<const RISING: bool, G: Grid<T>>(&self, table: &G, target: T) -> (T, Branch<T>) {
+        let (start, at_start, top) = self.branch_start::<RISING>(target);
         let (drive, line) = if RISING {
-            table.rise(start, self.drive, wanted - at_start)
+            table.rise(start, self.drive, target - at_start)
         } else {
-            table.fall(start, self.drive, at_start - wanted)
+            table.fall(start, self.drive, at_start - target)
         };
         (drive, Branch { top, at_start, line })
     }
@@ -362,29 +381,23 @@ impl<T: Real, const CAP: usize> ReversalMemory<T, CAP> {
     #[inline]
     pub(crate) fn origin(&self, drive: T) -> Origin<T> {
         let rising = drive > self.drive;
-        let (mut start, mut at_start, mut place) = if rising == self.is_rising() {
+        let (mut start, mut at_start, mut top) = if rising == self.is_rising() {
             let top = self.len - 1;
             (self.extremum(top), self.displacement_at(top), top)
         } else {
             (self.drive, self.displacement, self.len)
         };
-        while place >= 2 {
-            let bound = self.extremum(place - 1);
+        while top >= 2 {
+            let bound = self.extremum(top - 1);
             let wiped_out = if rising { drive >= bound } else { drive <= bound };
             if !wiped_out {
                 break;
             }
-            place -= 2;
-            start = self.extremum(place);
-            at_start = self.displacement_at(place);
+            top -= 2;
+            start = self.extremum(top);
+            at_start = self.displacement_at(top);
         }
-        Origin { place, start, at_start }
-    }
-
-    /// Extremum `k`, cells.
-    #[inline]
-    pub(crate) fn extremum_at(&self, k: usize) -> T {
-        self.extremum(k)
+        Origin { top, start, at_start }
     }
 
     /// Whether the branch since the last extremum rises (it left a minimum).
@@ -393,17 +406,19 @@ impl<T: Real, const CAP: usize> ReversalMemory<T, CAP> {
         self.len % 2 == 1
     }
 
+    /// p_k, cells.
     #[inline]
-    fn extremum(&self, k: usize) -> T {
+    pub(crate) fn extremum(&self, k: usize) -> T {
         self.extrema[Self::bounded(k)]
     }
 
+    /// f_k, m.
     #[inline]
     fn displacement_at(&self, k: usize) -> T {
         self.displacements[Self::bounded(k)]
     }
 
-    /// `k`, which is always below CAP. This form shows it to the compiler.
+    /// `k`, which is always below CAP. This form shows it to the compiler, which then adds no check that could panic.
     #[inline(always)]
     const fn bounded(k: usize) -> usize {
         if CAP.is_power_of_two() {
@@ -432,7 +447,7 @@ impl<T: Real, const CAP: usize> ReversalMemory<T, CAP> {
     ///
     /// Without p_i and p_{i+1}, every later displacement changes by the Everett rectangle of the four neighbours, w_i =
     /// E(p_{i−1}, p_i) − E(p_i, p_{i+1}) + E(p_{i+1}, p_{i+2}) − E(p_{i−1}, p_{i+2}) in absolute value. The pair with
-    /// the smallest w is dropped (dropping the innermost loop instead gave errors up to 3.9 µm); p₀ stays. Three of the
+    /// the smallest w is dropped; p₀ stays. Dropping the innermost loop instead gave errors up to 3.9 µm. Three of the
     /// four terms are differences of stored displacements.
     #[cold]
     #[inline(never)]

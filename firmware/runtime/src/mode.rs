@@ -1,4 +1,4 @@
-//! Active parts of the control law.
+//! Control modes: which parts of the control law are active.
 //!
 //! # Example
 //!
@@ -8,7 +8,7 @@
 //! let mode = ControlMode::from_word(6);
 //! assert_eq!(mode, Some(ControlMode::PF(Law::Pcc)));
 //! // Without estimates, P/F has the gains of P.
-//! assert!(ControlMode::PF(Law::Invhys).own_gains() && !ControlMode::PF(Law::Pcc).own_gains());
+//! assert!(ControlMode::PF(Law::Invhys).uses_position_gains() && !ControlMode::PF(Law::Pcc).uses_position_gains());
 //! assert!(!ControlMode::F(Law::Pcc).feeds_back());
 //! ```
 
@@ -17,7 +17,7 @@ use core::fmt;
 use crate::adaptation::Law;
 use crate::choice::{Choice, choice};
 
-/// Control mode of section 4. Its capabilities: `feeds_back`, `own_gains`, `inverts`, `damps_modes`.
+/// Control mode of section 4 of the paper. Its parts: `feeds_back`, `uses_position_gains`, `inverts`, `damps_modes`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ControlMode {
     /// P: position tracking (7) on a linear leg, u = q/ρ̂; no hysteresis model, no adaptation.
@@ -29,14 +29,14 @@ pub enum ControlMode {
 }
 
 impl ControlMode {
-    /// Names in commands and tables, each with its word, from word 0 on.
+    /// Name in commands and tables, and number in settings (the *word*), of each mode, in the order of the words.
     pub const WORDS: [(&'static str, u32); 7] =
         [("p", 0), ("f-invhys", 1), ("f-ewma", 2), ("f-pcc", 3), ("pf-invhys", 4), ("pf-ewma", 5), ("pf-pcc", 6)];
 
     /// Meaning of the words in the documentation of the settings.
     pub const MEANING: &'static str = "0 P; 1, 2, 3 F with Invhys, EWMA, PCC; 4, 5, 6 P/F with the same.";
 
-    /// Whether (7) feeds the pose error back.
+    /// Whether the position feedback (7) is active.
     #[inline]
     #[must_use]
     pub const fn feeds_back(self) -> bool {
@@ -46,18 +46,18 @@ impl ControlMode {
     /// Whether (7) works without estimates and therefore uses `position_gains` instead of `gains`.
     #[inline]
     #[must_use]
-    pub const fn own_gains(self) -> bool {
+    pub const fn uses_position_gains(self) -> bool {
         matches!(self, Self::P | Self::PF(Law::Invhys))
     }
 
-    /// Whether the legs go through the inverse Preisach model; if not, they are taken as linear.
+    /// Whether the legs are driven through the inverse hysteresis model; if not, they are assumed to be linear.
     #[inline]
     #[must_use]
     pub const fn inverts(self) -> bool {
         !matches!(self, Self::P)
     }
 
-    /// Whether active damping, if there is any, is active: only together with the feedback it was designed for.
+    /// Whether active damping, if the controller has it, is on. It is designed for the feedback of P/F.
     #[inline]
     #[must_use]
     pub const fn damps_modes(self) -> bool {
@@ -69,7 +69,7 @@ impl ControlMode {
         (0..).map_while(Self::from_word)
     }
 
-    /// Run-to-run law; `Invhys` in a mode without adaptation.
+    /// Run-to-run law; `Invhys` if there is no adaptation.
     #[inline]
     #[must_use]
     pub const fn law(self) -> Law {
@@ -79,7 +79,7 @@ impl ControlMode {
         }
     }
 
-    /// Its word; see [`ControlMode::MEANING`].
+    /// Number in settings; see [`ControlMode::MEANING`].
     #[inline]
     #[must_use]
     pub const fn word(self) -> u64 {
@@ -90,7 +90,7 @@ impl ControlMode {
         }
     }
 
-    /// The inverse of [`ControlMode::word`]; none for any other number.
+    /// The mode with this word; none if there is no such mode.
     #[must_use]
     pub const fn from_word(word: u64) -> Option<Self> {
         Some(match word {
@@ -125,7 +125,7 @@ choice! {
         Neglected = 0,
         /// K_e (h_d − h_e) with the stiffness in the settings.
         Modelled = 1,
-        /// The force/torque sensor.
+        /// That of the force/torque sensor.
         Measured = 2,
     }
 }
@@ -140,7 +140,7 @@ choice! {
     }
 }
 
-/// 0 before the first tick.
+/// In a snapshot: the mode of the last tick, or 0 before the first tick.
 impl Choice for Option<ControlMode> {
     fn to_word(&self) -> u64 {
         self.map_or(0, |mode| 1 + mode.word())

@@ -10,29 +10,30 @@ use super::structure::{Structure, StructureLanes};
 use crate::closed_loop::Preparation;
 use crate::plant::{Actuators, SmoothLag, steps_within};
 
-/// Ratio of long steps to the longest small one, and to that of the pre-cycle.
+/// Length of a long step over that of the longest small step, or over the update interval of the pre-cycle.
 const LONG: f64 = 5.0;
 
 /// A platform with six held voltages as inputs.
 ///
-/// Poses count from rest without drive after the pre-cycle of [`PlatformPlant::prepare`].
+/// Poses are relative to the pose at rest without drive after the pre-cycle of [`PlatformPlant::prepare`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct PlatformPlant {
     actuators: Actuators<LANES>,
     /// Full drive of each leg, V.
     peaks: Six,
-    /// Free displacements at rest, µm, and those since rest, m.
+    /// Free displacements at rest, µm.
     rest: Lane,
+    /// Free displacements relative to those at rest, m.
     displacement: Lane,
     structure: Structure,
-    /// Lag of the gauges for each coordinate of the pose; none: no lag.
+    /// Lag of the gauges, for each coordinate of the pose; none without lag.
     gauges: Option<[SmoothLag; 6]>,
     /// Structural modes of legs and gauges.
     modes: Option<Box<Modes>>,
     longest_step: f64,
-    /// Whether long steps are requested, see [`PlatformPlant::step_whole_ticks`]; and the structure of long steps, in
-    /// place of the other, while in use.
+    /// Whether long steps are requested, see [`PlatformPlant::step_whole_ticks`].
     long_steps: bool,
+    /// The structure while long steps are in use, in place of `structure`.
     long: Option<Box<StructureLanes>>,
 }
 
@@ -44,7 +45,7 @@ impl PlatformPlant {
         let lag = specimen.legs[0].gauge_lag_s;
         let mut structure = Structure::new(specimen.structure(), nominal.step_s);
         nominal.imperfections.cable.into_iter().for_each(|cable| structure.attach(cable));
-        // The structure takes what a mode does within a step as straight.
+        // The structure assumes linear motion within a step, so a fast mode needs short steps.
         let longest_step = nominal.imperfections.leg_step(nominal.step_s);
         let modes = Modes::of(&nominal.imperfections.modes, readings_near_rest(nominal));
         Self {
@@ -66,18 +67,20 @@ impl PlatformPlant {
         self.longest_step = step;
     }
 
-    /// From here on steps are five times as long as the longest small one, with the legs in parallel: about ten times
-    /// as fast, with other bits. The motion within a step of 100 µs is taken into account. At 56 µm and 10 Hz the pose
-    /// stays within 0.02 nm of that of the finest small steps, while small steps of 20 µs are off by 0.13 nm. With
-    /// amplifiers faster than a step it stays within 0.3 nm, and at their current limit within 1 nm.
+    /// Switches to steps that are five times as long, with the legs computed in parallel: about ten times as fast,
+    /// but not bit-identical. `interval` (s) is the expected interval of [`PlatformPlant::hold`]; others are possible.
     ///
-    /// Small steps remain in use under a disturbance, with a cable, and with structural modes of legs. `interval` (s) is that of the following holds; others are possible.
+    /// The motion of the legs within a step is taken into account. At 56 µm and 10 Hz, with steps of 100 µs, the pose is
+    /// within 0.02 nm of that with the finest small steps; small steps of 20 µs are off by 0.13 nm. With amplifiers faster
+    /// than a step the error is within 0.3 nm, and at their current limit within 1 nm.
+    ///
+    /// Small steps remain in use under a disturbance, with a cable, and with structural modes of legs.
     pub fn step_whole_ticks(&mut self, interval: f64) {
         self.long_steps = true;
         self.lengthen(interval / f64::from(steps_within(interval, LONG * self.longest_step)));
     }
 
-    /// Back to small steps: the plant's own, with which long ones are compared.
+    /// Switches back to small steps, the reference for long ones.
     pub fn step_small(&mut self) {
         self.long_steps = false;
         self.shorten();
@@ -95,17 +98,17 @@ impl PlatformPlant {
         }
     }
 
-    /// Copies the state of long steps back.
+    /// Ends long steps: copies their state back to `structure`.
     fn shorten(&mut self) {
         if let Some(long) = self.long.take() {
             long.put(&mut self.structure);
         }
     }
 
-    /// Pre-cycle of all free legs at once, and rest. Then the platform rests at the pose from which poses count, and
-    /// moves from there to its rest drive. The peak is limited to each leg's full drive.
+    /// Drives all legs, without load, to the peak and back, and waits. The pose then is the origin of all poses. Finally
+    /// the platform moves to its rest drive. The peak is limited to each leg's full drive.
     ///
-    /// Quasi-static for the structure, which follows the legs without error: it is set to rest at the end.
+    /// The structure is not simulated during the pre-cycle, which is quasi-static: it is set to rest at the end.
     pub fn prepare(&mut self, preparation: &Preparation) {
         let Preparation { rate, settle, update, rest, .. } = *preparation;
         self.shorten();
@@ -126,8 +129,8 @@ impl PlatformPlant {
         }
     }
 
-    /// Pre-cycle and rest of the legs in long steps. A ramp is monotonic, and the final rest hides how it was reached:
-    /// free displacements are those of small steps within 0.01 nm.
+    /// Pre-cycle and rest of the legs, in long steps. Hysteresis depends only on the extrema of the ramps, and creep settles
+    /// in the final rest: free displacements are within 0.01 nm of those with small steps.
     fn cycle(&mut self, &Preparation { peak, rate, settle, update, .. }: &Preparation) {
         let peaks = lanes_of(&self.peaks.map(|own| if peak < own { peak } else { own }));
         let highest = peaks.into_iter().fold(0.0, |highest, peak| if peak > highest { peak } else { highest });
@@ -146,7 +149,7 @@ impl PlatformPlant {
             }
         }
         for (rest, free) in self.rest.iter_mut().zip(free) {
-            // To m and back, as the structure takes it: all bits of a run depend on this rounding.
+            // To m and back, as the structure converts it: all bits of a run depend on this rounding.
             *rest += (free - *rest) * 1e-6 * 1e6;
         }
     }
@@ -188,18 +191,18 @@ impl PlatformPlant {
         }
     }
 
-    /// The pose of the gauges: h with their lag, which differs from the lag of each reading by less than 1e-14 m.
+    /// The pose that the gauges see: h with their lag. A lag on each reading instead differs by less than 1e-14 m.
     #[must_use]
     pub fn seen(&self) -> Six {
         self.seen_motion()[0]
     }
 
-    /// The same, and its rate, m/s and rad/s.
+    /// The pose that the gauges see and its rate, m/s and rad/s.
     pub(super) fn seen_motion(&self) -> [Six; 2] {
         seen(self.gauges.as_ref(), &[self.pose(), self.rate()])
     }
 
-    /// What structural modes add to the readings of the gauges, m, and its rate, m/s; none without modes.
+    /// Contribution of structural modes to the gauge readings, m, and its rate, m/s; none without modes.
     pub(super) fn added(&self) -> Option<&[Six; 2]> {
         self.modes.as_ref().map(|modes| modes.added())
     }
@@ -234,19 +237,19 @@ impl PlatformPlant {
         &self.structure
     }
 
-    /// Makes contact at the present pose, unloaded.
+    /// Brings a work part into contact at the present pose, without load.
     pub fn touch(&mut self, part: WorkPart) {
         self.shorten();
         self.structure.touch(part);
     }
 
-    /// Takes the part away.
+    /// Removes the work part.
     pub fn release(&mut self) {
         self.shorten();
         self.structure.release();
     }
 
-    /// Applies a wrench to the platform, in addition to that of a part, until it is changed.
+    /// Applies a constant wrench to the platform, in addition to that of a work part.
     pub fn disturb(&mut self, wrench: &Wrench) {
         if *wrench != self.structure.disturbance() {
             self.shorten();
@@ -254,7 +257,7 @@ impl PlatformPlant {
         }
     }
 
-    /// Wrench of part and disturbance on the platform.
+    /// Total wrench of work part and disturbance on the platform.
     #[must_use]
     pub fn wrench(&self) -> Wrench {
         let disturbance = self.structure.disturbance();
@@ -262,7 +265,7 @@ impl PlatformPlant {
     }
 }
 
-/// Readings per pose near rest.
+/// Jacobian of the gauge readings at rest, by central differences.
 fn readings_near_rest(nominal: &PlatformParameters) -> Matrix6 {
     const STEP: f64 = 1e-6;
     nominal.probes.map(|probe| {
@@ -284,7 +287,7 @@ fn seen(gauges: Option<&[SmoothLag; 6]>, motion: &[Six; 2]) -> [Six; 2] {
     })
 }
 
-/// Gauges with a lag, and modes in readings, follow a step (s) from one pose and rate to another.
+/// Advances the gauges' lag, and the structural modes of the gauges, by a step (s) from one pose and rate to another.
 fn gauges_follow(
     gauges: &mut Option<[SmoothLag; 6]>,
     modes: &mut Option<Box<Modes>>,

@@ -249,7 +249,7 @@ fn host(script: &[u8]) {
     let _ = session.supervise(Request::Arm);
     let _ = session.config();
     let _ = session.recorder(RecorderAction::Look);
-    let _ = session.download_on(&mut Vec::new());
+    let _ = session.download_part(&mut Vec::new());
     let _ = session.command(words);
     let _ = session.poll();
     let _ = session.stream(7);

@@ -11,7 +11,7 @@ use super::path_roles::InputFile;
 #[derive(Args, Debug)]
 #[command(after_help = super::examples::DESIGN)]
 pub struct Arguments {
-    /// The spec file, which gets `[control.design]`.
+    /// The spec file; the design is written into its `[control.design]`.
     spec: InputFile,
 }
 

@@ -32,7 +32,7 @@ pub struct Arguments {
 
 #[derive(Subcommand, Debug)]
 enum Kind {
-    /// Linear relation Y = ρX + δ of records at several frequencies, λ (ρ over that of the lowest), and the weights stable over λ.
+    /// Gain ρ of a leg at several frequencies (Y = ρX + δ), relative to the lowest one (λ), and weights that are stable over λ.
     Linear(LinearArguments),
     /// Frequency response from a swept sine, multisine or noise: resonance, damping, lag, dead time.
     Response(ResponseArguments),
@@ -90,7 +90,7 @@ struct LinearArguments {
     /// Frequency of the model's gain ρ̂, Hz; the lowest one if not given.
     #[arg(long, value_name = "HZ", value_parser = number("Hz", "a frequency in Hz above zero", 1e-6..=1e6))]
     reference: Option<f64>,
-    /// Check the weights of this spec, on its sampled loop, over the identified λ.
+    /// Check whether the weights of this spec are stable over the identified λ, on its sampled loop.
     #[arg(long, value_name = "SPEC")]
     spec: Option<InputFile>,
     #[command(flatten)]
@@ -144,8 +144,8 @@ struct GaugeArguments {
 #[derive(Args, Debug)]
 #[command(after_help = super::examples::PREDICT)]
 struct PredictArguments {
-    /// A table written by `specgen identify -o`, or a spec (.toml), whose tables, rate tables, creep and dead time
-    /// are used; also the lines of one leg that `identify rate -o` writes.
+    /// The model: a table written by `specgen identify -o`, a spec (.toml), with its tables, rate tables, creep and dead time, or
+    /// the lines of one leg that `identify rate -o` writes.
     #[arg(value_name = "TABLE|SPEC")]
     model: InputFile,
     /// Drive: CSV with time_s and drive_V (the command) or monitor_V (the measured voltage). With displacement_um, the
@@ -158,7 +158,7 @@ struct PredictArguments {
     #[arg(long, value_name = "MS", value_parser = number("", "milliseconds from 0 to 10", 0.0..=10.0), allow_negative_numbers = true)]
     dead_time: Option<f64>,
     /// Resonance in series with the model, as frequency in Hz and damping ratio, such as 735:0.015, or `none`. If not given, that
-    /// of the spec; with a table, that of ringing in the record.
+    /// of the spec; with a table, estimated from ringing in the record.
     #[arg(long, value_name = "HZ:ZETA", value_parser = mode)]
     mode: Option<ModeArgument>,
     /// Write time_s, drive_V, displacement_um (predicted) and, if measured, measured_um and error_um to this file.

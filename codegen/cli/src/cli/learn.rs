@@ -26,28 +26,28 @@ pub struct Arguments {
     /// machine over the link learns only trajectories of its spec.
     #[arg(long, value_name = "NAME")]
     trajectory: Option<String>,
-    /// Its operating frequency, Hz; 10, or that of the spec, if not given.
+    /// Operating frequency of the motion, Hz; that of the spec's trajectory, or 10, if not given.
     #[arg(long, value_name = "HZ", value_parser = frequency, allow_negative_numbers = true)]
     frequency: Option<f64>,
-    /// Largest number of learning passes; one more pass measures the result. Learning ends early after two passes in a row
-    /// without improvement, or the third that is worse.
+    /// Largest number of learning passes. Learning ends early after two passes in a row without improvement, or after the third
+    /// pass that is worse than the best one.
     #[arg(long, value_name = "N", default_value_t = 5, allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(0..=1000))]
     passes: u32,
-    /// Highest frequency to learn, Hz; lowered until every machine within [robust] converges. With --excite, the sweeps reach 1.6
-    /// times as far, at most 0.4 of the rate of the knots: at 10 kHz, 2000 shows structural modes up to 3.2 kHz.
+    /// Highest frequency to learn, Hz; lowered until learning converges on every machine within [robust]. With --excite, the
+    /// sweeps reach 1.6 times this frequency, at most 0.4 of the rate of the knots.
     #[arg(long, value_name = "HZ", value_parser = number("Hz", "a frequency from 0.001 to 4000 Hz", 1e-3..=4e3), allow_negative_numbers = true, default_value_t = BANDWIDTH)]
     bandwidth: f64,
     /// Range of an uncertainty, instead of that of [robust] or the default: `stiffness=2%`, `gain=0.9:1.1`, `delay_ticks=0`.
     #[arg(long, value_name = "NAME=RANGE", value_parser = UserRange::parse)]
     vary: Vec<UserRange>,
-    /// Start from the correction that the model predicts for lag and modes.
+    /// Start from the correction that the model predicts: it compensates lag and platform modes.
     #[arg(long, conflicts_with = "from")]
     prepare: bool,
     /// Start from this correction, of the same spec, machine and motion.
     #[arg(long, value_name = "FILE")]
     from: Option<InputFile>,
-    /// Learn nothing. Measure the response of the running loop to a correction, with sweeps during passes of the motion, and
-    /// write it to this file (JSON). Prints the structural modes that it shows, as lines for the spec.
+    /// Do not learn. Measure the response of the running loop to corrections (sweeps during passes of the motion), and write it
+    /// to this file (JSON). Structural modes that it shows are printed as lines for the spec.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["passes", "vary", "prepare", "from", "output", "response"])]
     excite: Option<OutputFile>,
     /// Learn with the response that --excite measured on this machine, instead of the model's with the intervals of [robust].

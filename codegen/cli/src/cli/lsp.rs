@@ -235,7 +235,7 @@ fn findings(open: &Open) -> Vec<Diagnostic> {
     }
     let source = SpecSource { display_name: open.uri.clone(), text: open.text.clone(), dir: folder(&open.uri) };
     match compile::compile_source(source) {
-        Ok(compiled) => [compiled.missed(), compiled.findings].concat(),
+        Ok(compiled) => [compiled.unmet_requirements(), compiled.findings].concat(),
         Err(refused) => refused.findings,
     }
 }

@@ -15,7 +15,7 @@ use super::path_roles::OutputFolder;
 pub struct Arguments {
     /// Name of the platform and of the new folder; a path creates the folder elsewhere.
     name: OutputFolder,
-    /// Ask nothing; take values that are not given from this spec.
+    /// Ask no questions: values that are not given as options are those of this template.
     #[arg(long, value_enum)]
     like: Option<Like>,
     #[command(flatten)]

@@ -24,7 +24,7 @@ const NO_TRAJECTORY: u32 = 1;
 pub struct Arguments {
     /// The spec file.
     spec: InputFile,
-    /// Name of the machine, for the controller's `--sim`.
+    /// Name under which the controller finds the machine, with `rt-pc --sim NAME`.
     #[arg(long, default_value = "plant")]
     name: String,
     /// Stop after this time, s; run until Ctrl-C if not given.
@@ -36,8 +36,8 @@ pub struct Arguments {
     /// SCHED_FIFO priority, below the controller's; normal scheduling if not given.
     #[arg(long, value_name = "P", allow_negative_numbers = true, value_parser = clap::value_parser!(u8).range(1..=98))]
     priority: Option<u8>,
-    /// A wiring fault, such as "gauge 3 inverted", "leg 1 swapped with leg 4", "leg 2 dead", "gauge 0 gain x 0.50", or "all" single
-    /// faults. Several faults are applied in turn, a new one each time the amplifiers are switched on.
+    /// A wiring fault, such as "gauge 3 inverted", "leg 1 swapped with leg 4", "leg 2 dead", "gauge 0 gain x 0.50", or "all" for every
+    /// single fault. Several faults are applied in turn, a new one each time the amplifiers are switched on.
     #[arg(long, value_name = "FAULT", value_parser = faults)]
     wrong: Vec<Faults>,
     #[command(flatten)]

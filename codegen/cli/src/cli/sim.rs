@@ -31,8 +31,8 @@ pub struct Arguments {
     paper: bool,
     #[command(flatten)]
     plant: PlantArguments,
-    /// Without [control]: control ticks per period of the motion. If not given, the spec's period is used; with --paper, 500
-    /// ticks. Stability is checked at the resulting interval.
+    /// Without [control]: control ticks per period of the motion. If not given, the spec's control period is used, or with
+    /// --paper 500 ticks. Stability is checked at the resulting control period.
     #[arg(long, allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     samples: Option<u32>,
     /// Frequencies of the motions (with --paper, of cases 1 and 2), Hz; 1 and 10 if not given. 0.1 takes ten times as long as 1.

@@ -18,7 +18,7 @@ use super::sim::{PlantArguments, frequency};
 pub struct Arguments {
     /// The spec file.
     spec: InputFile,
-    /// What to tune, as far as the spec's mode uses it.
+    /// Parameters to tune; those that the spec's control mode does not use are left out.
     #[arg(long, value_enum, default_value = "all")]
     what: WhatArgument,
     /// Optimiser.
@@ -33,8 +33,8 @@ pub struct Arguments {
     /// Candidates per generation; 100 (Table 3) for the genetic algorithm or 20 for CMA-ES if not given.
     #[arg(long, allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(4..=100_000))]
     population: Option<u32>,
-    /// Trajectory used for tuning. The result is scored on another one: case 1 or that of the leg; on the multisine if tuned
-    /// on one of these.
+    /// Trajectory used for tuning. The result is also scored on a trajectory that was not used: case 1 (six legs: leg), or the
+    /// multisine after tuning on one of these.
     #[arg(long, value_enum, default_value = "multisine")]
     trajectory: TrajectoryArgument,
     /// Highest frequency of the multisine, or operating frequency of the paper's trajectory, Hz.
@@ -63,7 +63,7 @@ pub struct Arguments {
     /// numbers, in the units of --bounds. Omitted parameters keep the spec's value. `[]` prints names and bounds.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["optimiser", "compare", "evaluations", "population", "output", "write", "plot"])]
     evaluate: Option<InputFile>,
-    /// Folder for front, history, report and plot.
+    /// Folder for the Pareto front, the history, the report and the plot.
     #[arg(short, long, value_name = "DIR")]
     output: Option<OutputFolder>,
     /// Write the result into the spec. Without it, the change is printed as a patch.

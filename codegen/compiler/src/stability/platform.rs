@@ -156,7 +156,7 @@ pub fn design(model: &Model, task: &TaskSpace, plant: &RestDynamics) -> Result<D
     });
     let margins: Vec<ModeMargins> = ControlMode::all()
         .map(|law| {
-            let tuning = if law.own_gains() { &position } else { &combined };
+            let tuning = if law.uses_position_gains() { &position } else { &combined };
             ModeMargins::of(&corners, law, tuning, ratios)
         })
         .collect();
@@ -211,7 +211,7 @@ impl Design {
     /// The numbers of a mode.
     #[must_use]
     pub fn tuning(&self, mode: ControlMode) -> &Tuning {
-        if mode.own_gains() { &self.position } else { &self.combined }
+        if mode.uses_position_gains() { &self.position } else { &self.combined }
     }
 
     /// The closed loop of the spec without tuning; `task` is its `[control]`.

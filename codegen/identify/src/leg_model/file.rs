@@ -28,7 +28,7 @@ pub fn read_leg_csv(text: &str, shown_as: &str) -> Result<LegModel, Vec<Diagnost
     let line = text.lines().enumerate().find_map(|(at, line)| Some((at + 1, line.strip_prefix(AROUND)?)));
     let Some((at, line)) = line else { return Ok(LegModel { table, around: None }) };
     let around = serde_json::from_str::<Around>(line).map_err(|error| error.to_string());
-    match around.and_then(|around| around.checked()) {
+    match around.and_then(|around| around.validate()) {
         Ok(around) => Ok(LegModel { table, around: Some(around) }),
         Err(why) => {
             let mut findings = Findings::new(shown_as);

@@ -222,7 +222,7 @@ impl<'a> Problem<'a> {
         let mut z = shape.start / shape.beta_plus_gamma;
         let mut before = self.samples.drive[0];
         let advance = |u: &f64| {
-            z = advanced(z, *u - before, [shape.beta_plus_gamma, shape.beta_minus_gamma]);
+            z = state_after(z, *u - before, [shape.beta_plus_gamma, shape.beta_minus_gamma]);
             before = *u;
             z
         };
@@ -411,7 +411,7 @@ fn level(rows: &[f64], width: usize, family: Family) -> Vec<f64> {
 }
 
 /// z after a step of the drive, V, with β + γ and β − γ (1/V): exact on either side of 0.
-pub(super) fn advanced(z: f64, step: f64, [plus, minus]: [f64; 2]) -> f64 {
+pub(super) fn state_after(z: f64, step: f64, [plus, minus]: [f64; 2]) -> f64 {
     let direction = if step < 0.0 { -1.0 } else { 1.0 };
     let (mut along, mut left) = (direction * z, step.abs());
     if along < 0.0 {

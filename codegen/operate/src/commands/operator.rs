@@ -518,7 +518,7 @@ impl<P: Port> Operator<P> {
     pub(crate) fn record(&mut self) -> Result<Vec<u8>, SessionError> {
         let (mut whole, mut looked) = (Vec::new(), Instant::now());
         loop {
-            let complete = self.session.download_on(&mut whole).map_err(|error| match error {
+            let complete = self.session.download_part(&mut whole).map_err(|error| match error {
                 ClientError::Refused(Refusal::State) => {
                     SessionError::Refused("the recorder is running; `record stop`, or wait for its trigger".to_owned())
                 }

@@ -1,4 +1,4 @@
-//! Runs passes on a machine, simulated or real, until learning stops.
+//! Runs passes of a motion on a machine, simulated or real, and learns from each until learning ends.
 
 use std::cmp::Ordering;
 use std::fmt;
@@ -22,7 +22,7 @@ use super::update::Update;
 
 /// Shortest time in which a correction may rise from zero to its limit, s.
 pub(super) const ONSET: f64 = 1e-3;
-/// Status bits for refused or stale set-points: the motion was not made.
+/// Status bits for refused or stale set-points: the machine did not follow the motion.
 const NOT_FOLLOWED: u32 = 0x3_0000;
 /// Status bits for implausible gauges.
 const GAUGES: u32 = 0x3f00;
@@ -32,10 +32,10 @@ const LEGS: u32 = 0x3f;
 const CORRECTION_LIMITED: u32 = 1 << 20;
 /// The error counts as growing above this multiple of the smallest one.
 const GROWS: f64 = 1.5;
-/// Least share of its update that the host applies; each worse pass halves it. A smaller update converges where the response is less
-/// accurate, such as with hysteresis of another slope.
+/// Smallest fraction of an update that the host applies; each worse pass halves the fraction. A smaller step converges with a larger
+/// error of the response, such as another slope of the hysteresis.
 const LEAST_SHARE: f64 = 0.25;
-/// Headroom of a sufficient limit: later passes change a correction further.
+/// Factor on a sufficient limit, because later passes change the correction further.
 const HEADROOM: f64 = 1.2;
 
 /// Reasons learning is refused.
@@ -43,9 +43,9 @@ const HEADROOM: f64 = 1.2;
 pub enum LearnError {
     /// The simulated machine cannot make a pass.
     Run(RunError),
-    /// A pass ended with these status bits: the controller refused a set-point or rejected a gauge.
+    /// The controller refused a set-point or rejected a gauge in a pass; its status bits.
     Status(u32),
-    /// Limits restricted the excitation, with these status bits.
+    /// Limits restricted the excitation; the status bits.
     Limited(u32),
     /// The machine ended a pass; its operator knows why.
     Ended,
@@ -93,7 +93,7 @@ pub enum Learner<'a> {
 }
 
 impl<'a> Learner<'a> {
-    /// Begins to learn, from two passes under the same correction.
+    /// Begins to learn. The difference of two passes with the `equal` correction shows the noise.
     fn session(self, equal: [&PassObservation; 2], motion: &Motion) -> Session<'a> {
         match self {
             Self::Host(update) => {
@@ -104,7 +104,7 @@ impl<'a> Learner<'a> {
     }
 }
 
-/// A learner with what it knows of the noise.
+/// A learner; for the host with its estimate of the noise.
 enum Session<'a> {
     Host(&'a Update, Box<Coherence>),
     Device(&'a Plan),
@@ -121,12 +121,12 @@ impl Session<'_> {
         }
     }
 
-    /// Whether a part of a correction can be learned: a device learns the whole of it.
+    /// Whether the step can be reduced: a device always applies the full update.
     fn can_share(&self) -> bool {
         matches!(self, Self::Host(..))
     }
 
-    /// The correction of the next pass, from the one `played` and the observations of passes under it, the last one `seen`.
+    /// The correction of the next pass. `played` is the present correction, `before` and `seen` are observations of passes with it.
     fn next(
         &mut self,
         machine: &mut dyn RepeatableMachine,
@@ -144,7 +144,7 @@ impl Session<'_> {
     }
 }
 
-/// Knots a `share` (0 to 1) of the way from one correction to another. Knots that the first lacks count as zero.
+/// Interpolates between two corrections: `share` 0 gives `from`, 1 gives `to`. Knots missing in `from` count as zero.
 fn between(from: &[Knot], to: Vec<Knot>, share: f64) -> Vec<Knot> {
     let part = |from: i32, to: i32| {
         let [from, to] = [f64::from(from), f64::from(to)];
@@ -157,21 +157,21 @@ fn between(from: &[Knot], to: Vec<Knot>, share: f64) -> Vec<Knot> {
     if share < 1.0 { to.iter().enumerate().map(knot).collect() } else { to }
 }
 
-/// What a pass shows where a correction may be.
+/// The measured errors of a pass, over the ticks in which a correction can act.
 fn errors<'a>(seen: &'a PassObservation, motion: &Motion) -> &'a [[f64; 6]] {
     &seen.measured[..motion.corrected]
 }
 
-/// The correction that knots give, tick by tick, m and rad.
+/// The correction of each tick, interpolated between the knots, m and rad.
 pub(super) fn given(played: &[Knot], motion: &Motion, spacing: u32) -> Vec<[f64; 6]> {
     (0..motion.corrected as u32).map(|tick| playback::at(played, spacing, tick)).collect()
 }
 
-/// The limit (m) within which these knots are played as they are, with headroom.
+/// The limit `control.correction` (m) with which these knots are played unchanged, times [`HEADROOM`].
 fn sufficient(played: &[Knot], motion: &Motion, spacing: u32) -> f64 {
     let arms = [1.0, motion.radius];
     let correction = given(played, motion, spacing);
-    // A limit also bounds the rate: it is reached in the onset time at the fastest.
+    // The limit also bounds the rate: a correction takes at least the onset time to reach it.
     let rates = correction
         .windows(2)
         .map(|pair| std::array::from_fn(|axis| (pair[1][axis] - pair[0][axis]) * ONSET / motion.interval));
@@ -199,7 +199,7 @@ pub trait RepeatableMachine {
         plan.next(played, &seen.kept).ok_or(LearnError::Refused)
     }
 
-    /// Learning has ended with this correction: a machine with another one in memory loads this one.
+    /// Learning has ended with this correction: the machine loads it if it has another one in memory.
     ///
     /// # Errors
     /// If the machine refuses it.
@@ -208,13 +208,13 @@ pub trait RepeatableMachine {
     }
 }
 
-/// The course of a pass of the trajectory with this number.
+/// Timing of a pass: its ticks, the spacing of its knots, and the number of its trajectory.
 #[must_use]
 pub fn course(motion: &Motion, spacing: u32, trajectory: u32) -> Course {
     Course { spacing, before: motion.scored.start as u32, ticks: motion.corrected as u32, trajectory }
 }
 
-/// Errors tick by tick, m and rad, held between the recorded knots.
+/// The error of each tick, m and rad: that of its knot, held for `spacing` ticks.
 #[must_use]
 pub fn held(errors: &[Knot], spacing: u32, ticks: usize) -> Vec<[f64; 6]> {
     let metres = |knot: &Knot| knot.map(|value| f64::from(value) * UNIT);
@@ -228,7 +228,7 @@ pub fn translation_nm(errors: &[Knot]) -> f64 {
     libm::sqrt(squares.sum::<f64>() / errors.len() as f64) * UNIT * 1e9
 }
 
-/// Uses the same player as a real machine.
+/// The simulated machine. It plays knots with the code of a real device.
 impl RepeatableMachine for Bench<'_> {
     fn pass(&mut self, motion: &Motion, knots: &[Knot], spacing: u32) -> Result<PassObservation, LearnError> {
         let course = course(motion, spacing, 0);
@@ -292,7 +292,7 @@ impl Pass {
     }
 }
 
-/// Rms over the motion itself of weighted translations and angles, nm or nrad.
+/// Rms of weighted translations and angles over the motion itself, without the rest before and after, nm or nrad.
 fn rms(errors: &[[f64; 6]], motion: &Motion, weights: [f64; 2]) -> f64 {
     let sum: f64 = errors[motion.scored.clone()]
         .iter()
@@ -325,16 +325,16 @@ pub enum Ending {
 /// Result of learning.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct LearningResult {
-    /// The first pass has no correction, or the initial one.
+    /// All passes that count; the first one has no correction, or the initial one.
     pub passes: Vec<Pass>,
     /// The pass whose correction is kept: the last one better than all before it by more than the noise; 0 if there is none.
     pub best: usize,
-    /// Its knots.
+    /// Knots of the correction of that pass.
     #[serde(skip)]
     pub knots: Vec<Knot>,
-    /// Difference of two passes under the same correction in [`Pass::measured_nm`], nm; `None` if there was nothing to learn from.
+    /// Noise: difference of [`Pass::measured_nm`] between two passes with the same correction, nm; `None` if no pass was to be learned.
     pub noise_nm: Option<f64>,
-    /// [`Pass::measured_nm`] that learning with the machine's own response, up to [`super::Convergence::reach`], would leave of the first pass,
+    /// [`Pass::measured_nm`] that is expected after learning with the machine's measured response, up to [`super::Convergence::reach`],
     /// nm; `None` if the device learns.
     pub expected_nm: Option<f64>,
     /// If a correction was limited: the limit (`control.correction`) that the first one needs, with headroom, nm.
@@ -351,12 +351,15 @@ impl LearningResult {
     }
 }
 
-/// Makes up to `count` passes after the first and learns from each. A correction is kept if its pass is better than the best one before it by
-/// more than the noise of both, and not worse than the first pass in translation or angles. After a pass worse by more than the noise,
-/// the host learns half as much from the best one; the third such pass ends learning, and so do two consecutive passes
-/// without improvement. A device ends at the first. Two passes before the first do not count: only after one pass is the hysteresis
-/// as in every repetition, and the second shows the differences between repetitions. `begin` is the correction of these three; no knots means
-/// no correction. If the machine ends a pass after the first, learning ends. `watch` is called after each pass and may stop learning.
+/// Makes up to `count` passes after the first and learns from each.
+///
+/// - The first pass and the two before it have the correction `begin`; no knots means no correction. Those two do not count: one brings the
+///   hysteresis into the state of every repetition, the other shows the noise, the difference between repetitions.
+/// - A correction is kept if its pass is better than the best one before it by more than the noise of both, and not worse than the first
+///   pass in translation or angles.
+/// - After a pass worse by more than the noise, the host goes back to the best correction and halves its step. The third such pass ends
+///   learning, or the first if the device learns, and so do two consecutive passes without improvement.
+/// - If the machine ends a pass after the first, learning ends. `watch` is called after each pass and may stop learning.
 ///
 /// # Errors
 /// If the machine does not complete a pass or does not follow the motion.

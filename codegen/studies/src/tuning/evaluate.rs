@@ -239,7 +239,7 @@ impl Case {
         armed.configure(&start.words(&armed))?;
         let study = PlatformStudy::new(&scenario, &armed, trajectory.as_ref(), conditions.whole_ticks)?;
         let stiffness = axis_stiffness(model);
-        let alone = start_mode(model, task).own_gains();
+        let alone = start_mode(model, task).uses_position_gains();
         Ok(Self {
             kind: Kind::Platform { study, radius: model.geometry.joint_radius(), stiffness, alone },
             period: model.timing.period,

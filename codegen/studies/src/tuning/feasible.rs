@@ -66,7 +66,7 @@ impl Feasibility {
         let own = start_mode(model, task);
         let mut laws = vec![own];
         let kinds: &[LoopKind] =
-            if own.own_gains() { &[LoopKind::Position] } else { &[LoopKind::Estimates, LoopKind::Combined] };
+            if own.uses_position_gains() { &[LoopKind::Position] } else { &[LoopKind::Estimates, LoopKind::Combined] };
         laws.extend(kinds.iter().copied().flat_map(LoopKind::modes).filter(|law| *law != own));
         let demand = StructureDemand::of(model, &closed_loop.basis);
         let corners = Box::new(Corners::of(closed_loop, demand));
@@ -81,7 +81,7 @@ impl Feasibility {
                 leg_holds(dynamics, adaptation, required, *level, *drift)
             }
             (Self::Platform { corners, laws, ratios, required }, Setting::Platform { period, .. }) => {
-                let tuning = |law: &ControlMode| setting.tuning(law.own_gains());
+                let tuning = |law: &ControlMode| setting.tuning(law.uses_position_gains());
                 laws.iter()
                     .all(|law| platform_holds(corners.closed_loop(), *law, &tuning(law), *ratios, required, *period))
                     && laws.iter().all(|law| corners.tolerates(*law, &tuning(law)))

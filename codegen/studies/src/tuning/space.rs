@@ -123,7 +123,7 @@ impl Space {
         let mut parameters = Vec::new();
         let mut add = |role: Role, bounds: [f64; 2]| parameters.push(Parameter { role, bounds });
         let mut stiffness = [1.0; 6];
-        let alone = mode.is_some_and(ControlMode::own_gains);
+        let alone = mode.is_some_and(ControlMode::uses_position_gains);
         if let Some(design) = &compiled.design {
             stiffness = axis_stiffness(model);
             if what != TunedNumbers::Weights && mode.is_some_and(ControlMode::feeds_back) {

@@ -59,14 +59,14 @@ impl<P: Platform> Settings<P> {
     #[inline]
     #[must_use]
     pub const fn active_gains(&self) -> &Gains<P::Real> {
-        if self.mode.own_gains() { &self.position_gains } else { &self.gains }
+        if self.mode.uses_position_gains() { &self.position_gains } else { &self.gains }
     }
 
     /// Whether any k_v of the present mode is non-zero.
     #[inline]
     #[must_use]
     pub const fn damps(&self) -> bool {
-        if self.mode.own_gains() { self.damps[1] } else { self.mode.feeds_back() && self.damps[0] }
+        if self.mode.uses_position_gains() { self.damps[1] } else { self.mode.feeds_back() && self.damps[0] }
     }
 }
 

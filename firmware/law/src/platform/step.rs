@@ -12,19 +12,20 @@
 //!            + J⁻ᵀ k_v ė/k_a + τ (Δl(h_d(t_{n+1})) − Δl(h_d(t_n)))/T_s                damping, lead
 //! legs       q = Δl(h_d) + p + J⁻ᵀ(k_p e + s)/k_a − δ̂ − φ̂ ;  u = Γ⁻¹(q)       limited: q̂ is q within the limits
 //! ```
-//! N is the modal notch, T_s the period. A correction c that was learned or prepared for the motion adds J c to q
-//! (`specgen_runtime::correction`). Active damping, if the spec has it, adds J V D(z) V⁻¹ (h_d − h) to q
-//! (`specgen_runtime::damping`). The innovation sees neither of them, nor the term of k_v, nor the lead. Without the
-//! last two, p is a real load on the legs and belongs to the model of the innovation. The feedback is not a load and
-//! does not belong to it.
+//! N is the modal notch, T_s the period. Two further terms of q are J c of a correction c that was learned or prepared
+//! for the motion (`specgen_runtime::correction`), and J V D(z) V⁻¹ (h_d − h) of active damping
+//! (`specgen_runtime::damping`).
 //!
-//! Y = Δl(h) is linearised about the set-point, Δl(h_d) − J e. With q = Δl(h_d) + p + f − δ̂ − φ̂ + b (feedback f,
-//! offset b of a change of mode) and w = q − q̂ withheld by limits, the innovation is then w − b − f − J e: no large
-//! numbers are subtracted, and f is small in modal coordinates, too. This neglects the error times the change of J over
-//! the workspace, about a thousandth of the error, and the rounding of the converter on a free leg.
+//! The innovation ν compares Y with q̂ − p, because the load p deflects the legs. Lead, k_v, active damping and
+//! correction are no loads, but ν leaves them out in the same way. The feedback f = J⁻ᵀ(k_p e + s)/k_a stays in ν.
 //!
-//! δ̂ and φ̂ are in modal coordinates, as N is. With equal weights on all legs, the law commutes with the map between
-//! the coordinates, and one map takes feedback and estimates to the legs, J⁻ᵀF/k_a − δ̂ − φ̂ = J V (V⁻¹K⁻¹F − δ̂ − φ̂).
+//! Y = Δl(h) is linearised about the set-point, Δl(h_d) − J e. With the offset b of a change of mode and the part
+//! w = q − q̂ that limits withhold, q = Δl(h_d) + p + f − δ̂ − φ̂ + b gives ν = N(w − b − f − J e). This form does not
+//! subtract large numbers. It neglects the error times the change of J over the workspace, about a thousandth of the
+//! error, and the rounding of the converter on a free leg.
+//!
+//! δ̂ and φ̂ are in modal coordinates, as N is. The law has equal weights on all legs, so it is the same in both
+//! coordinates, and one map takes feedback and estimates to the legs: J⁻ᵀF/k_a − δ̂ − φ̂ = J V (V⁻¹K⁻¹F − δ̂ − φ̂).
 
 use specgen_runtime::feedback::{force_of, winds_up};
 use specgen_runtime::linear::{difference, each, is_within, transform};
@@ -43,9 +44,10 @@ use super::tick::TickInput;
 use crate::kinematics::leg_displacements;
 use crate::memory::LegMemory as _;
 use crate::spec::{Config, LEGS};
-use crate::status::{CORRECTION_LIMITED, WRENCH_FAULT};
+use crate::status::{CORRECTION_LIMITED, GAUGE_FAULT, STATIC_INVERSE, WRENCH_FAULT};
 
-/// A tick of the law, or of its fallback, with `kind` in place of the command's; returns the status.
+/// Computes one tick at this fallback stage and returns the status. The set-point command is of this `kind`, whatever
+/// the input requests: the supervisor may hold the platform.
 pub fn advance<P: Platform>(
     p: P,
     config: &Config<P>,
@@ -62,28 +64,29 @@ pub fn advance<P: Platform>(
     if gauge_faults == 0 {
         learn(p, config, state);
     } else {
-        state.damping.act(p.damping(), &[P::Real::ZERO; 6]);
+        state.damping.update(p.damping(), &[P::Real::ZERO; 6]);
     }
-    let wrench_good = take_wrench(p, config, state, &input.wrench);
-    let damping = damping(p, config, state);
-    let played = state.generator.plays();
-    let moved = p.hands_over() && state.generator.can_stop();
+    let wrench_valid = take_wrench(p, config, state, &input.wrench);
+    let velocity_feedback = velocity_feedback(p, config, state);
+    let trajectory_before = state.generator.plays();
+    // The generator can stop while a motion is under way, not at rest.
+    let was_moving = p.hands_over() && state.generator.can_stop();
     let setpoint_status = state.generator.tick_as(p.setpoints(), kind, &input.command);
-    if moved && !state.generator.can_stop() {
+    if was_moving && !state.generator.can_stop() {
         integral_to_estimates(p, config, state);
     }
     let (demand, load) = known_load(p, config, state);
-    let correction_held = state.correction.follow(p.correction(), &input.correction);
+    let correction_limited = state.correction.follow(p.correction(), &input.correction);
     let reaction = reaction(p, config, state);
     if p.lead() == P::Real::ZERO && p.own_leads().is_empty() {
         state.load = load;
     } else {
-        let lead = lead(p, played.or(state.generator.plays()));
+        let lead = lead(p, trajectory_before.or(state.generator.plays()));
         state.load = each(|leg| load[leg] + (demand[leg] - state.demand[leg]) * lead);
     }
     state.demand = demand;
-    if let Some(damping) = &damping {
-        state.load = each(|leg| state.load[leg] + damping[leg]);
+    if let Some(velocity_feedback) = &velocity_feedback {
+        state.load = each(|leg| state.load[leg] + velocity_feedback[leg]);
     }
     let mut request = each(|leg| demand[leg] + state.load[leg] + reaction[leg]);
     if entered {
@@ -104,16 +107,17 @@ pub fn advance<P: Platform>(
     state.limited = limited != 0;
     let mut static_inverse = 0;
     for (index, leg) in state.legs.iter().enumerate() {
-        static_inverse |= ((config.mode.inverts() && leg.memory.fell_back()) as u32) << (24 + index);
+        let fell_back = config.mode.inverts() && leg.memory.fell_back();
+        static_inverse |= (fell_back as u32) << (STATIC_INVERSE.trailing_zeros() as usize + index);
     }
-    let inputs = if wrench_good { 0 } else { WRENCH_FAULT } | if correction_held { CORRECTION_LIMITED } else { 0 };
-    static_inverse | limited | gauge_faults << 8 | setpoint_status | inputs
+    let inputs = if wrench_valid { 0 } else { WRENCH_FAULT } | if correction_limited { CORRECTION_LIMITED } else { 0 };
+    static_inverse | limited | gauge_faults << GAUGE_FAULT.trailing_zeros() | setpoint_status | inputs
 }
 
-/// Lead of the trajectory being played, or of any other motion.
+/// Lead of a trajectory, or of any other motion (none); in periods.
 #[inline]
-fn lead<P: Platform>(p: P, played: Option<u32>) -> P::Real {
-    match played {
+fn lead<P: Platform>(p: P, trajectory: Option<u32>) -> P::Real {
+    match trajectory {
         Some(selector) if !p.own_leads().is_empty() => {
             p.own_leads().get(selector as usize).copied().unwrap_or(p.lead())
         }
@@ -150,7 +154,7 @@ fn enter_mode<P: Platform>(p: P, config: &Config<P>, state: &mut State<P>) -> bo
         }
     }
     for leg in &mut state.legs {
-        leg.requested = requested(p, mode, leg);
+        leg.requested = requested_displacement(p, mode, leg);
         leg.excess = P::Real::ZERO;
     }
     state.limited = false;
@@ -169,8 +173,9 @@ fn enter_mode<P: Platform>(p: P, config: &Config<P>, state: &mut State<P>) -> bo
     true
 }
 
-/// Bumpless change of mode: the difference between the legs' position and the first `request` of a mode (m of each leg)
-/// goes to the estimates, or to the integral if every axis has one. Otherwise it becomes an offset that fades.
+/// Makes the change of mode bumpless: the difference between the last request and the first `request` of the new mode (m
+/// of each leg) goes to the estimates, or to the integral if every axis has one. Otherwise it becomes an offset that
+/// fades.
 #[cold]
 fn bumpless_transfer<P: Platform>(p: P, config: &Config<P>, state: &mut State<P>, request: &[P::Real; LEGS]) {
     let held = each(|leg| state.legs[leg].requested - request[leg]);
@@ -188,8 +193,8 @@ fn bumpless_transfer<P: Platform>(p: P, config: &Config<P>, state: &mut State<P>
     state.transfer.begin(offset);
 }
 
-/// Enters or leaves the fallback. Active damping starts again from zero: its present request, against the
-/// oscillation, would otherwise stay as an error of the platform. Integral and estimates stay.
+/// Enters or leaves a fallback stage. Active damping is reset, or its last request would remain as a pose error.
+/// Integral and estimates stay.
 #[cold]
 #[inline(never)]
 fn fall_back<P: Platform>(state: &mut State<P>, fallback: Fallback) {
@@ -197,13 +202,13 @@ fn fall_back<P: Platform>(state: &mut State<P>, fallback: Fallback) {
     state.damping.rest();
     if fallback == Fallback::FeedForward {
         for estimate in &mut state.estimates {
-            // δ̂ would continue to move with φ̂.
+            // The drift φ̂ would continue to change the level δ̂.
             *estimate = Estimate { level: estimate.correction(), drift: P::Real::ZERO };
         }
     }
 }
 
-/// An error or innovation, scaled by the fallback stage.
+/// Scales an error or innovation by the share of the fallback stage.
 #[cold]
 #[inline(never)]
 fn weaken<T: Real>(fallback: Fallback, values: &mut [T; 6]) {
@@ -213,9 +218,9 @@ fn weaken<T: Real>(fallback: Fallback, values: &mut [T; 6]) {
     }
 }
 
-/// When the set-point comes to rest, the estimates take over the integral. Nothing else of the request changes. Both
-/// act on one error; otherwise the integral would return, at the rate k_I/(1 + k_p), what the estimates unlearn at
-/// their rate.
+/// When the set-point comes to rest, the estimates take over the integral; the request stays the same. Otherwise both
+/// would drift against each other, since they act on the same error: the estimates take over the integral's deflection
+/// at their rate, and the integral releases it at another, k_I/(1 + k_p).
 #[cold]
 fn integral_to_estimates<P: Platform>(p: P, config: &Config<P>, state: &mut State<P>) {
     let mode = config.mode;
@@ -228,7 +233,7 @@ fn integral_to_estimates<P: Platform>(p: P, config: &Config<P>, state: &mut Stat
     }
 }
 
-/// h and ḣ from the gauges; returns the invalid gauges, bit by bit. If a gauge is invalid, the last pose is held.
+/// Updates h and ḣ from the gauges, and returns a bit for each invalid gauge. If there is one, the last pose is held.
 #[inline]
 pub fn sense<P: Platform>(p: P, config: &Config<P>, state: &mut State<P>, gauge: &[P::Real; 6]) -> u32 {
     let faults = faults(gauge, p.raw_limits());
@@ -252,7 +257,7 @@ pub fn learn<P: Platform>(p: P, config: &Config<P>, state: &mut State<P>) {
     let error = modal_error(p, &difference(&state.generator.target().pose, &state.pose));
     let fallback = state.fallback;
     if mode.damps_modes() && fallback == Fallback::None {
-        state.damping.act(p.damping(), &error);
+        state.damping.update(p.damping(), &error);
     }
     if mode.feeds_back() {
         state.error = notch_error(p, &mut state.error_notch, &error);
@@ -266,12 +271,12 @@ pub fn learn<P: Platform>(p: P, config: &Config<P>, state: &mut State<P>) {
     }
     if mode.law() != Law::Invhys {
         let disturbed = state.limited || state.transfer.is_active();
-        let mut innovation = each(|mode| -error[mode] - state.deflection[mode]);
+        let mut innovation = each(|k| -error[k] - state.deflection[k]);
         if disturbed {
             let offset = state.transfer.offset();
             let withheld = each(|leg| state.legs[leg].excess - offset[leg]);
             let withheld = transform(p.legs_to_modes(), &withheld);
-            innovation = each(|mode| innovation[mode] + withheld[mode]);
+            innovation = each(|k| innovation[k] + withheld[k]);
         }
         let mut innovation = notch_innovation(p, &mut state.innovation_notch, &innovation);
         if fallback != Fallback::None {
@@ -289,22 +294,22 @@ fn would_wind_up<P: Platform>(p: P, legs: &[LegState<P>; LEGS], growth: &[P::Rea
     winds_up(&excess, &transform(p.wrench_to_legs(), growth))
 }
 
-/// Takes the measured wrench if it is valid. If `config.interaction` is not `Measured`, it is not checked.
+/// Stores the measured wrench if it is valid. Returns whether it is, or true if `config.interaction` does not use it.
 #[inline]
 fn take_wrench<P: Platform>(p: P, config: &Config<P>, state: &mut State<P>, wrench: &[P::Real; 6]) -> bool {
     if config.interaction != Interaction::Measured {
         return true;
     }
-    let good = is_within(wrench, p.wrench_limit());
-    if good {
+    let valid = is_within(wrench, p.wrench_limit());
+    if valid {
         state.wrench = *wrench;
     }
-    good
+    valid
 }
 
 /// J⁻ᵀ k_v ė/k_a with ė = ḣ_d(t_n) − ḣ: m of each leg; none without k_v.
 #[inline]
-fn damping<P: Platform>(p: P, config: &Config<P>, state: &State<P>) -> Option<[P::Real; LEGS]> {
+fn velocity_feedback<P: Platform>(p: P, config: &Config<P>, state: &State<P>) -> Option<[P::Real; LEGS]> {
     if !config.damps() {
         return None;
     }
@@ -315,8 +320,8 @@ fn damping<P: Platform>(p: P, config: &Config<P>, state: &State<P>) -> Option<[P
     Some(transform(p.wrench_to_legs(), &force_of(&config.active_gains().derivative, &error)))
 }
 
-/// Leg displacements at the set-point, and the legs' deflections under motion, gravity and the work piece there, (7);
-/// m.
+/// Leg displacements at the set-point, and the deflections of the legs there under inertia, gravity and the work piece
+/// (7), m.
 #[inline]
 pub fn known_load<P: Platform>(p: P, config: &Config<P>, state: &State<P>) -> ([P::Real; LEGS], [P::Real; LEGS]) {
     let target = state.generator.target();
@@ -346,17 +351,16 @@ pub fn reaction<P: Platform>(p: P, config: &Config<P>, state: &mut State<P>) -> 
         let force = each(|axis| proportional[axis] + integral[axis]);
         state.deflection = transform(p.force_to_modes(), &force);
     }
-    let wanted = each(|mode| state.deflection[mode] - state.estimates[mode].correction());
-    let mut wanted = state.damping.beside(wanted);
+    let mut request = state.damping.add_to(each(|mode| state.deflection[mode] - state.estimates[mode].correction()));
     if let Some(correction) = state.correction.pose() {
         let correction = modal_error(p, &correction);
-        wanted = each(|mode| wanted[mode] + correction[mode]);
+        request = each(|mode| request[mode] + correction[mode]);
     }
-    transform(p.modes_to_legs(), &wanted)
+    transform(p.modes_to_legs(), &request)
 }
 
-/// The request as a permitted code; the memory then follows the drive of that code. Returns whether a limit of table,
-/// voltage or slew rate held the leg back.
+/// Converts a request (m) to a permitted code, and applies the drive of that code to the leg's memory. Returns whether a
+/// limit of table, voltage or slew rate held the leg back.
 #[inline(never)]
 pub fn actuate<P: Platform>(
     p: P,
@@ -371,7 +375,8 @@ pub fn actuate<P: Platform>(
     actuate_limited(p, config, leg, table, request)
 }
 
-/// The fast path of a tracking leg. If it does not apply, nothing has changed. Returns whether it applied.
+/// The fast path: no limit holds the leg back, and the drive stays in its cell of the table. Returns whether it applies;
+/// if not, nothing has changed.
 #[inline(always)]
 fn track<P: Platform>(p: P, config: &Config<P>, leg: &mut LegState<P>, table: &P::Table, request: P::Real) -> bool {
     let previous = leg.code;
@@ -388,7 +393,7 @@ fn track<P: Platform>(p: P, config: &Config<P>, leg: &mut LegState<P>, table: &P
     tracked
 }
 
-/// [`actuate`] for any request.
+/// The general path of [`actuate`].
 #[inline(never)]
 fn actuate_limited<P: Platform>(
     p: P,
@@ -399,18 +404,18 @@ fn actuate_limited<P: Platform>(
 ) -> bool {
     let LegState { memory, code, .. } = leg;
     let mut limited = false;
-    let mut permitted = |drive: P::Real| {
+    let mut permit = |drive: P::Real| {
         let (permitted, held_back) = p.dac().code(drive, *code, config.code_limits);
         *code = permitted;
         limited |= held_back;
         p.dac().drive(permitted)
     };
     if config.mode.inverts() {
-        let out_of_reach = memory.follow_within(table, request, &mut permitted);
+        let out_of_reach = memory.follow_within(table, request, &mut permit);
         limited |= out_of_reach;
         leg.requested = leg.memory.displacement();
     } else {
-        let drive = permitted(request * p.cells_per_metre());
+        let drive = permit(request * p.cells_per_metre());
         memory.apply(table, drive);
         leg.requested = drive * p.metres_per_cell();
     }
@@ -420,6 +425,6 @@ fn actuate_limited<P: Platform>(
 
 /// Displacement that the present code requests, in the leg model of a mode, m.
 #[inline]
-fn requested<P: Platform>(p: P, mode: ControlMode, leg: &LegState<P>) -> P::Real {
+fn requested_displacement<P: Platform>(p: P, mode: ControlMode, leg: &LegState<P>) -> P::Real {
     if mode.inverts() { leg.memory.displacement() } else { p.dac().drive(leg.code) * p.metres_per_cell() }
 }

@@ -44,7 +44,7 @@ impl<'a> Keeper<'a> {
         self.outlets.snapshots.is_some() || self.tape.is_some()
     }
 
-    pub fn ordered(&mut self) {
+    pub fn count_command(&mut self) {
         self.taken = self.taken.wrapping_add(1);
     }
 
@@ -85,7 +85,7 @@ impl<'a> Keeper<'a> {
             row.recorded = Some(tape.rows());
             row.triggered = matches!(tape.activity(), Activity::Triggered(_) | Activity::Complete);
         }
-        (row.opens, row.orders) = (self.opens, self.taken);
+        (row.opens, row.commands) = (self.opens, self.taken);
         self.since += 1;
         if self.lost || self.outlets.rows.push(row).is_err() {
             self.shared.lost_rows.fetch_add(1, Ordering::Relaxed);
@@ -159,7 +159,7 @@ mod tests {
             place,
             digest,
             late: 0,
-            orders: 0,
+            commands: 0,
             opens,
             waving,
             edge: EdgeStatus::NONE,
@@ -227,10 +227,10 @@ mod tests {
         let last = 2 * u64::from(SNAPSHOT_EVERY) + 50;
         for count in 0..last {
             keeper.keep(row(count, 1));
-            keeper.ordered();
+            keeper.count_command();
             keeper.prepare(&machine, &config, count + 1, count == 99);
             let row = rows.pop().unwrap();
-            assert_eq!(u64::from(row.orders), count);
+            assert_eq!(u64::from(row.commands), count);
             assert_eq!((row.recorded, row.triggered), (None, false));
             if row.opens {
                 let snapshot = snapshots.pop().unwrap();

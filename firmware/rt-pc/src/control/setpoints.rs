@@ -228,7 +228,7 @@ mod tests {
     }
 
     #[test]
-    fn what_waits_is_refused_where_something_moves_and_dropped_by_other_orders() {
+    fn what_waits_is_refused_where_something_moves_and_dropped_by_other_commands() {
         let waits = || {
             let mut setpoints = setpoints();
             assert!(!setpoints.sense(LOW));
@@ -252,8 +252,8 @@ mod tests {
         await_it(&mut setpoints);
         tick(&mut setpoints, 1, HIGH, 0);
         assert_eq!(stage(&setpoints), Some(pending::Stage::Refused));
-        // Other orders, and a machine that does not run.
-        let orders: [fn(&mut Setpoints); 6] = [
+        // Other commands, and a machine that does not run.
+        let commands: [fn(&mut Setpoints); 6] = [
             |setpoints| setpoints.stop_waiting(),
             |setpoints| setpoints.accept(OperatorRequest { command: Some([1; COMMAND_WORDS]), request: Request::None }),
             |setpoints| setpoints.start(wave(9)),
@@ -261,7 +261,7 @@ mod tests {
             |setpoints| setpoints.pass(player()),
             |setpoints| setpoints.begin_awaited(3, Phase::Holding, 0, &Config::new()),
         ];
-        for order in orders {
+        for order in commands {
             let mut setpoints = waits();
             await_it(&mut setpoints);
             order(&mut setpoints);

@@ -460,9 +460,9 @@ mod tests {
             assert_eq!(ask_as(&mut console, B, false, &recorder(action)), refused(Refusal::Busy));
             assert!(ask(&mut console, &recorder(action)).contains("running: true"));
         }
-        let orders: Vec<_> = console.outgoing().0.iter().collect();
+        let commands: Vec<_> = console.outgoing().0.iter().collect();
         assert!(
-            matches!(orders[..], [LoopCommand::Record(settings), LoopCommand::Trigger, LoopCommand::StopRecorder] if settings.after == 1)
+            matches!(commands[..], [LoopCommand::Record(settings), LoopCommand::Trigger, LoopCommand::StopRecorder] if settings.after == 1)
         );
         let arm = |after| Request::Recorder { action: RecorderAction::Arm { after } };
         assert_eq!(ask(&mut console, &arm(CAPACITY + 1)), refused(Refusal::Word { index: 0 }));
@@ -492,9 +492,9 @@ mod tests {
         assert!(!console.is_engaged() && console.outgoing().0.is_empty());
         assert_eq!(wave(&mut console, start, &good), DONE);
         assert!(console.is_engaged());
-        let orders: Vec<_> = console.outgoing().0.iter().collect();
+        let commands: Vec<_> = console.outgoing().0.iter().collect();
         assert!(
-            matches!(orders[..], [LoopCommand::Request(_), LoopCommand::Wave(wave)] if format!("{wave:?}").contains(" ticks: 50 "))
+            matches!(commands[..], [LoopCommand::Request(_), LoopCommand::Wave(wave)] if format!("{wave:?}").contains(" ticks: 50 "))
         );
         assert_eq!(wave(&mut console, start, &good), refused(Refusal::State));
         assert_eq!(wave(&mut console, WaveAction::Stop, &[]), DONE);

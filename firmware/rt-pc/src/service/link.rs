@@ -221,7 +221,7 @@ mod tests {
             self.link.serve(&mut self.console, self.now);
         }
 
-        fn orders(&mut self) -> usize {
+        fn commands(&mut self) -> usize {
             self.console.outgoing().0.len()
         }
     }
@@ -457,12 +457,12 @@ mod tests {
             sender.write_all(&sent).unwrap();
             // Hold.
             assert_eq!(stopper.ask(&Request::Supervise { request: 3 }).map_err(refused), Ok(Reply::Done));
-            let obeyed = world.borrow_mut().orders();
+            let obeyed = world.borrow_mut().commands();
             assert!(if stops_first { obeyed == 0 } else { (1..SENT / 2).contains(&obeyed) }, "{obeyed}");
             for _ in 0..20 {
                 world.borrow_mut().serve();
             }
-            assert_eq!(world.borrow_mut().orders(), obeyed);
+            assert_eq!(world.borrow_mut().commands(), obeyed);
             assert_eq!(world.borrow().link.traffic().requests, 2 + 1 + SENT as u64);
             // What comes after that counts.
             drop(sender);
@@ -470,7 +470,7 @@ mod tests {
             let stop = Request::Wave { action: WaveAction::Stop, words: Bytes(&[]) };
             world.borrow_mut().now += SILENCE + 1;
             assert_eq!(sender.ask(&stop).map_err(refused), Ok(Reply::Done));
-            assert_eq!(world.borrow_mut().orders(), obeyed + 1);
+            assert_eq!(world.borrow_mut().commands(), obeyed + 1);
         }
     }
 

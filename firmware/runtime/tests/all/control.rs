@@ -73,23 +73,23 @@ fn active_damping_is_the_difference_equation_of_its_sections() {
     let (mut inputs, mut outputs) = (vec![[0.0; 6]; 2], vec![[0.0; 6]; 2]);
     for tick in 0..200_u32 {
         let error: [f64; 6] = std::array::from_fn(|k| f64::from((tick * 37 + k as u32 * 11) % 101) * 1e-8 - 5e-7);
-        damping.act(&sections, &error);
+        damping.update(&sections, &error);
         inputs.push(error);
         let (x, y) = (&inputs[inputs.len() - 3..], &outputs[outputs.len() - 2..]);
         let expected: [f64; 6] = std::array::from_fn(|k| {
             let Resonator { b, a } = sections[k];
             b[0] * x[2][k] + b[1] * x[1][k] + b[2] * x[0][k] - a[0] * y[1][k] - a[1] * y[0][k]
         });
-        for (found, expected) in damping.asked.iter().zip(&expected) {
+        for (found, expected) in damping.request.iter().zip(&expected) {
             assert!((found - expected).abs() < 1e-18, "tick {tick}: {found:e}, {expected:e}");
         }
-        assert_eq!(damping.beside([1.0; 6]), damping.asked.map(|asked| 1.0 + asked));
+        assert_eq!(damping.add_to([1.0; 6]), damping.request.map(|request| 1.0 + request));
         outputs.push(expected);
     }
     // Without sections nothing is asked for, and nothing takes room.
     let mut none = Damping::<f64, 0>::new();
-    none.act(&[], &[1.0; 6]);
-    assert_eq!((none.beside([1.0; 6]), size_of_val(&none)), ([1.0; 6], 0));
+    none.update(&[], &[1.0; 6]);
+    assert_eq!((none.add_to([1.0; 6]), size_of_val(&none)), ([1.0; 6], 0));
 }
 
 /// |c| ≤ most and |Δc| ≤ step whatever is asked for; what is within both is taken as it is, and what is no number leads back to nothing.

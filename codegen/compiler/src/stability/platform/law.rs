@@ -41,7 +41,7 @@ impl LoopKind {
     /// That of a mode.
     #[must_use]
     pub fn of(mode: ControlMode) -> Self {
-        match (mode.feeds_back(), mode.own_gains()) {
+        match (mode.feeds_back(), mode.uses_position_gains()) {
             (true, true) => Self::Position,
             (true, false) => Self::Combined,
             (false, _) if mode.law() != Law::Invhys => Self::Estimates,
