@@ -157,7 +157,7 @@ fn built(root: &Path, packages: &[Package]) -> Outcome {
         return setup::missing(format!("{error}"));
     }
     for package in packages {
-        let mut build = cargo(root, &[&["build", "--release", "--quiet", "--locked"], package].concat());
+        let mut build = cargo(root, &[&["build", "--release", "--quiet", "--locked"][..], package].concat());
         // The same folder for both: the dependencies of the tool are in the workspace's.
         build.arg("--target-dir").arg(built_in(root));
         let outcome = expect_success(build, "see above");
