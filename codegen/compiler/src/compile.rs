@@ -95,7 +95,7 @@ pub fn compile_source(source: SpecSource) -> Result<Compilation, Refusal> {
 
 /// Runs the phases in their order. None if one of `findings` is an error.
 fn run_phases(source: &SpecSource, findings: &mut Vec<Diagnostic>) -> Option<Compilation> {
-    let model = check_spec(source, findings)?;
+    let mut model = check_spec(source, findings)?;
 
     // These are independent: one run reports the findings of all of them.
     let stability = accept(check_stability(&model), findings);
@@ -103,6 +103,7 @@ fn run_phases(source: &SpecSource, findings: &mut Vec<Diagnostic>) -> Option<Com
     let setpoints = accept(setpoint::declared(&model, &source.dir), findings);
     let converters = accept(requirements::check(&model), findings);
     let ((margins, design), records, setpoints, ()) = (stability?, records?, setpoints?, converters?);
+    model.hysteresis.grid = records.grid(model.hysteresis.grid);
     findings.extend(records.warnings);
     findings.extend(design.iter().flat_map(|design| design.findings.clone()));
     findings.extend(setpoints.warnings);

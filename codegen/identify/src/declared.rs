@@ -3,13 +3,13 @@
 use std::path::Path;
 
 use crate::everett::EverettTable;
-use crate::leg_model::{Around, Family, FamilyScore, LegModel, choose};
+use crate::leg_model::{Around, Family, FamilyScore, LegModel, choose, on_grid};
 use crate::mode::Mode;
 use crate::rate::period::{INVERTED, Invertible};
 use crate::rate::{CreepTerm, Inertia, RateModel};
 use crate::{Options, Report, is_simulated, is_table_csv, parse_record, rate, read_file, read_leg_csv};
 use specgen_language::diagnostic::{Code, Diagnostic, Place, codes};
-use specgen_language::model::{Hysteresis, Model, RateDependence};
+use specgen_language::model::{Hysteresis, MAX_GRID, Model, RateDependence, Scalar};
 use specgen_language::spec::LegLines;
 
 /// Largest ratio of a record's displacement to that of stack gain and voltage: creep and a rough data sheet explain
@@ -59,13 +59,35 @@ pub fn records(model: &Model, dir: &Path) -> Result<SpecRecords, Vec<Diagnostic>
         errors.extend(all.not_invertible(model));
     }
     if errors.is_empty() {
+        let grid = all.grid(model.hysteresis.grid);
+        all.tables.iter_mut().filter(|table| table.grid < grid).for_each(|table| *table = on_grid(table, grid));
         return Ok(all);
     }
     errors.extend(all.warnings);
     Err(errors)
 }
 
+/// The finest grid that a leg model may choose: that of the spec if it gives one, otherwise with tables in at most half of
+/// the flash.
+fn finest(model: &Model) -> usize {
+    let Hysteresis { grid, records, .. } = &model.hysteresis;
+    if model.spans.contains_key("hysteresis.grid") {
+        return *grid;
+    }
+    let scalar = if model.controller.scalar == Scalar::F32 { 4 } else { 8 };
+    let bytes = |grid: usize| (scalar * records.len() * (grid + 1) * (grid + 2) / 2) as u64;
+    let fits = |grid: &usize| model.target.budget.flash.is_none_or(|flash| 2 * bytes(*grid) <= flash);
+    let doubles = core::iter::successors(Some(2 * grid), |grid| Some(2 * grid));
+    doubles.take_while(|grid| *grid <= MAX_GRID && fits(grid)).last().unwrap_or(*grid)
+}
+
 impl SpecRecords {
+    /// N of its tables, `least` if there is none.
+    #[must_use]
+    pub fn grid(&self, least: usize) -> usize {
+        self.tables.iter().fold(least, |most, table| if table.grid > most { table.grid } else { most })
+    }
+
     /// The model of `leg`, 0 to 5, as in `model`; its dead time counts from the voltage. None without records.
     #[must_use]
     pub fn leg(&self, model: &Model, leg: usize) -> Option<RateModel> {
@@ -108,6 +130,7 @@ impl SpecRecords {
             found
         } else {
             let options = Options::new(model.hysteresis.grid, model.actuator.voltage);
+            let options = Options { finest: finest(model), ..options };
             let record = parse_record(&text, name)?;
             let choice = choose(&record, &options, model.hysteresis.model).map_err(about_voltage)?;
             let identified = choice.table;

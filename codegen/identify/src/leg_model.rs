@@ -23,6 +23,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::everett::EverettTable;
 use crate::least_squares;
+use crate::regressor::{self, Plane};
 
 pub use families::{Choice, FamilyScore, choose};
 pub use family::Family;
@@ -179,6 +180,20 @@ pub fn strokes(tables: &[EverettTable], around: &[Option<Around>]) -> Vec<f64> {
         _ => table.node(table.grid, 0),
     };
     tables.iter().enumerate().map(of).collect()
+}
+
+/// The same function on another grid: between the nodes of `table` as the controller interpolates.
+#[must_use]
+pub(crate) fn on_grid(table: &EverettTable, grid: usize) -> EverettTable {
+    let plane = Plane { grid: table.grid, range: [table.drive_min, table.drive_max] };
+    let mut finer = EverettTable { grid, drive_min: table.drive_min, drive_max: table.drive_max, nodes: Vec::new() };
+    let mut row = Vec::new();
+    for (up, down) in (1..=grid).flat_map(|up| (0..up).map(move |down| (up, down))) {
+        row.clear();
+        plane.add_everett(finer.threshold(up), finer.threshold(down), 1.0, &mut row);
+        finer.nodes.push(regressor::evaluate(&row, &table.nodes));
+    }
+    finer
 }
 
 /// Model of a leg.

@@ -92,6 +92,8 @@ pub use statistics::extent;
 pub struct Options {
     /// N, intervals per axis, 2 to [`MAX_GRID`].
     pub grid: usize,
+    /// Finest grid that a leg model with plays may choose, `grid` doubled once or more; no finer one if it is less than that.
+    pub finest: usize,
     /// Range of the thresholds [lowest, highest], V.
     pub drive: [f64; 2],
     /// Also remove, within branches, the drift that the returns to saturation show. Creep looks like drift there, so
@@ -102,10 +104,10 @@ pub struct Options {
 }
 
 impl Options {
-    /// Usual choices: no drift within a branch, dead time estimated where the record allows it.
+    /// Usual choices: this grid, no drift within a branch, dead time estimated where the record allows it.
     #[must_use]
     pub const fn new(grid: usize, drive: [f64; 2]) -> Self {
-        Self { grid, drive, drift: false, dead_time: DeadTime::Estimate }
+        Self { grid, finest: grid, drive, drift: false, dead_time: DeadTime::Estimate }
     }
 }
 

@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Mutex, OnceLock, PoisonError};
 
 use host_sim::controller::Controller;
-use host_sim::forc::ReversalExperiment;
+use host_sim::forc::{ReversalExperiment, ReversalRow};
 use host_sim::noise::Gauge;
 use host_sim::plant::{LegParameters, LegPlant};
 use host_sim::platform::rig::{Noise, RunOptions};
@@ -95,6 +95,21 @@ pub fn records(legs: &[LegParameters; 6], grid: u32) -> [String; 6] {
     };
     let first = of(0);
     std::array::from_fn(|leg| if legs[leg] == legs[0] { first.clone() } else { of(leg) })
+}
+
+/// Reversal curves of six legs as built at 20 V/s, and as many at 640 V/s.
+pub fn two_rates(legs: &[LegParameters; 6]) -> [String; 6] {
+    std::array::from_fn(|leg| {
+        let mut gauge = Gauge::new(&legs[leg].noise, SEED, leg as u64);
+        let mut plant = LegPlant::new(&legs[leg]);
+        let slow = ReversalExperiment { update: 5e-4, ..ReversalExperiment::reference(32) };
+        let fast = ReversalExperiment { rate: 640.0, update: 5e-5, ..slow };
+        let mut record = slow.run(&mut plant, &mut gauge);
+        let last = record.rows.last().map_or(0.0, |row| row.time);
+        let more = fast.run(&mut plant, &mut gauge).rows.into_iter().skip(1);
+        record.rows.extend(more.map(|row| ReversalRow { time: last + row.time, ..row }));
+        record.to_csv()
+    })
 }
 
 /// Applies `each` to 0..`count` on as many threads as the machine has; the results are in order.

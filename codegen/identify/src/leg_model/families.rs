@@ -4,8 +4,8 @@ use serde::Serialize;
 use specgen_numerics::nnls;
 
 use super::family::{Family, TIMES};
-use super::fit::{Problem, Samples, Shape, Solution, of_play, play, thresholds};
-use super::{Around, LegModel, READ_OUT};
+use super::fit::{PLAYS, Problem, Samples, Shape, Solution, of_play, play};
+use super::{Around, LegModel, READ_OUT, on_grid};
 use crate::branches::Branch;
 use crate::everett::EverettTable;
 use crate::findings::Findings;
@@ -52,12 +52,15 @@ pub struct Choice {
     pub table: Identification,
 }
 
-/// Fits the families that `kind` permits to `record` and chooses one; `options` as in [`identify`].
+/// Fits the families that `kind` permits to `record` and chooses one; `options` as in [`identify`]. A model with plays may
+/// be on a finer grid, see [`crate::Options::finest`].
 ///
 /// # Errors
 /// As [`identify`]; E0622 if the curves turn back at too few voltages to hold any out.
 pub fn choose(record: &Record, options: &crate::Options, kind: Kind) -> Result<Choice, Vec<Diagnostic>> {
-    let table = identify(record, options)?;
+    // A table has a weight for each of its cells, so those that are compared with leg models stay coarse.
+    let coarse = crate::Options { grid: if options.grid > PLAYS { PLAYS } else { options.grid }, ..*options };
+    let table = identify(record, if kind == Kind::Preisach { options } else { &coarse })?;
     if kind == Kind::Preisach {
         let family = Family { kind, creep: false };
         let model = LegModel { table: table.table.clone(), around: None };
@@ -75,6 +78,8 @@ struct Candidate {
     model: Option<LegModel>,
     /// Mean square of the samples held out, of each fold, µm².
     squares: Vec<f64>,
+    /// How the plays of the solution begin, and its searched unknowns; none of a table.
+    fitted: Option<(bool, Shape)>,
 }
 
 fn chosen(
@@ -84,7 +89,7 @@ fn chosen(
     table: &Identification,
     findings: &mut Findings,
 ) -> Option<(Family, LegModel, Vec<FamilyScore>)> {
-    let plane = Plane { grid: options.grid, range: options.drive };
+    let plane = Plane { grid: table.table.grid, range: options.drive };
     let used = selection::usable(record, &plane, findings)?;
     let (slow, fast) = dead_time::rates(record, &used.branches);
     if fast < dead_time::RATE_RATIO * slow {
@@ -114,7 +119,7 @@ fn chosen(
         return findings.refuse(codes::NOT_DETERMINED, None, "no leg model fits the record".to_owned(), help);
     };
     let mut scores = Vec::new();
-    let mut chosen = None;
+    let mut chosen: Option<Candidate> = None;
     let worthwhile = WORTHWHILE[0] * mean(&best).sqrt() + WORTHWHILE[1] * table.report.noise_floor * 1e6;
     for candidate in candidates {
         let worse: Vec<f64> = candidate.squares.iter().zip(&best).map(|(a, b)| a.sqrt() - b.sqrt()).collect();
@@ -124,12 +129,15 @@ fn chosen(
         // The table has to be as good as the others; among these the price decides.
         let slack = if candidate.family.kind == Kind::Preisach { 0.0 } else { worthwhile };
         if chosen.is_none() && (excess <= error || excess <= slack) {
-            chosen = candidate.model.map(|model| (candidate.family, model));
+            chosen = Some(candidate);
         }
     }
-    let (family, model) = chosen?;
-    let model = if family.is_table() { LegModel { table: table.table.clone(), around: None } } else { model };
-    Some((family, model, scores))
+    let mut chosen = chosen?;
+    let family = chosen.family;
+    if family.is_table() {
+        chosen.model = Some(LegModel { table: table.table.clone(), around: None });
+    }
+    Some((family, data.on_grid(chosen, folds, options)?, scores))
 }
 
 /// A record for all families.
@@ -192,31 +200,63 @@ impl<'a> Data<'a> {
         if family.kind == Kind::Preisach {
             return self.tables(family, folds);
         }
-        let mut best: Option<(Problem, Solution)> = None;
+        let mut best: Option<(bool, Problem, Solution)> = None;
         // Bouc-Wen alone has one play, which starts where the drive is.
         for saturated in if family.has_plays() { &[true, false][..] } else { &[false] } {
-            let problem = Problem::new(&self.samples, family, *saturated);
+            let problem = Problem::new(&self.samples, family, PLAYS, *saturated);
             if let Some(solution) = problem.search(None, None)
-                && best.as_ref().is_none_or(|(_, best)| solution.rms < best.rms)
+                && best.as_ref().is_none_or(|(.., best)| solution.rms < best.rms)
             {
-                best = Some((problem, solution));
+                best = Some((*saturated, problem, solution));
             }
         }
-        let (problem, solution) = best?;
-        let model = model(&problem, &solution, self.plane);
+        let (saturated, problem, solution) = best?;
+        let model = model_of(&problem, &solution, self.plane);
         let squares = (0..folds).map(|fold| {
             let held_out = problem.search(Some(&solution.shape), Some(fold));
             held_out.map_or(f64::INFINITY, |found| self.square(fold, &found.residual))
         });
         let squares = squares.collect();
-        Some(Candidate { family, model, squares })
+        Some(Candidate { family, model, squares, fitted: Some((saturated, solution.shape)) })
+    }
+
+    /// The chosen model on the grid of the controller, with at least as many plays as cells: of `options.grid` and its doubles
+    /// to `options.finest`, the coarsest whose error on curves that were held out exceeds that of the best by at most one
+    /// standard error. A model without plays has nothing to show on a finer grid.
+    fn on_grid(&self, chosen: Candidate, folds: usize, options: &crate::Options) -> Option<LegModel> {
+        let Candidate { family, model, fitted, .. } = chosen;
+        let mut chosen = model?;
+        let finest = if fitted.is_some() && family.has_plays() { options.finest } else { 0 };
+        let Some((saturated, shape)) = fitted.filter(|_| finest > self.plane.grid) else {
+            if options.grid > chosen.table.grid {
+                chosen.table = on_grid(&chosen.table, options.grid);
+            }
+            return Some(chosen);
+        };
+        let doubles = core::iter::successors(Some(options.grid), |grid| Some(2 * grid));
+        let mut tried: Vec<(LegModel, Vec<f64>)> = Vec::new();
+        for grid in doubles.take_while(|grid| *grid <= finest) {
+            let problem = Problem::new(&self.samples, family, if grid > PLAYS { grid } else { PLAYS }, saturated);
+            let fitted = problem.at(shape, None);
+            let model = fitted.and_then(|fitted| model_of(&problem, &fitted, &Plane { grid, range: self.plane.range }));
+            let squares = (0..folds).map(|fold| Some(self.square(fold, &problem.at(shape, Some(fold))?.residual)));
+            tried.extend(model.zip(squares.collect::<Option<Vec<f64>>>()));
+        }
+        let best = tried.iter().map(|(_, squares)| squares).reduce(|a, b| if mean(b) < mean(a) { b } else { a });
+        let Some(best) = best.cloned() else { return Some(chosen) };
+        let coarsest = tried.into_iter().find(|(_, squares)| {
+            let worse: Vec<f64> = squares.iter().zip(&best).map(|(a, b)| a.sqrt() - b.sqrt()).collect();
+            let (excess, error) = mean_and_error(&worse);
+            excess <= error
+        });
+        Some(coarsest?.0)
     }
 
     /// Everett tables, after creep of the level that plays show.
     fn tables(&self, family: Family, folds: usize) -> Option<Candidate> {
         let creep = if family.creep {
             let plays = Family { kind: Kind::GeneralizedPlays, creep: true };
-            Problem::new(&self.samples, plays, true).search(None, None)?.shape.creep
+            Problem::new(&self.samples, plays, PLAYS, true).search(None, None)?.shape.creep
         } else {
             0.0
         };
@@ -241,7 +281,7 @@ impl<'a> Data<'a> {
             table: table.clone(),
         });
         let model = model.or(Some(LegModel { table, around: None }));
-        Some(Candidate { family, model, squares })
+        Some(Candidate { family, model, squares, fitted: None })
     }
 
     /// The Everett table of `h` (µm) without the curves of fold `out`.
@@ -278,11 +318,11 @@ fn terms(creep: f64) -> Vec<[f64; 2]> {
 }
 
 /// The solution as a table and what is around it; none if it cannot be inverted.
-fn model(problem: &Problem, solution: &Solution, plane: &Plane) -> Option<LegModel> {
+fn model_of(problem: &Problem, solution: &Solution, plane: &Plane) -> Option<LegModel> {
     let Problem { family, unit, .. } = *problem;
     let (weights, taken, constant, read_out) = problem.parts(&solution.values);
     let [low, high] = plane.range;
-    let r = thresholds(family, plane.range);
+    let r = problem.thresholds();
     // Σ f_i at plays that `place` gives, µm.
     let sum = |place: &dyn Fn(f64) -> f64| {
         let (mut sum, mut weights) = (0.0, weights.iter());

@@ -9,8 +9,8 @@ use crate::mixed;
 use crate::staircase::saturate;
 use crate::statistics::mean;
 
-/// Plays of a family that has them.
-const PLAYS: usize = 32;
+/// Plays of a family that has them, in the search and in the choice of the family.
+pub(super) const PLAYS: usize = 32;
 /// Largest creep level.
 const MOST_CREEP: f64 = 0.03;
 /// Slow starts of the creep that a record may show: those of the first time constants.
@@ -133,6 +133,8 @@ pub(super) struct Shape {
 pub(super) struct Problem<'a> {
     pub(super) samples: &'a Samples,
     pub(super) family: Family,
+    /// Number of plays of a family that has them.
+    plays: usize,
     /// Largest |y|: the unit of the read-out's polynomial, µm.
     pub(super) unit: f64,
     /// Of each sample: the plays' columns, then 1 and the starts of the creep.
@@ -155,11 +157,6 @@ pub(super) struct Solution {
     pub(super) rms: f64,
 }
 
-/// Thresholds of the plays of a family, V.
-pub(super) fn thresholds(family: Family, range: [f64; 2]) -> Vec<f64> {
-    let count = if family.has_plays() { PLAYS } else { 1 };
-    (0..count).map(|k| 0.5 * (range[1] - range[0]) * k as f64 / PLAYS as f64).collect()
-}
 
 /// Columns of a play at `p` with threshold `r`: p itself, or the integrals of the three Bernstein polynomials of degree 2
 /// over its range, which rise.
@@ -180,21 +177,27 @@ pub(super) fn play(p: f64, r: f64, u: f64, range: [f64; 2]) -> f64 {
     saturate(saturate(p, [u - r, u + r]), [range[0] + r, range[1] - r])
 }
 
+/// Thresholds of the plays of a family, V: evenly from 0 to half the range.
+fn thresholds(family: Family, plays: usize, range: [f64; 2]) -> Vec<f64> {
+    let count = if family.has_plays() { plays } else { 1 };
+    (0..count).map(|k| 0.5 * (range[1] - range[0]) * k as f64 / plays as f64).collect()
+}
+
 impl<'a> Problem<'a> {
     /// `saturated`: the plays begin as after a fall from the highest drive, not as built.
-    pub(super) fn new(samples: &'a Samples, family: Family, saturated: bool) -> Self {
+    pub(super) fn new(samples: &'a Samples, family: Family, plays: usize, saturated: bool) -> Self {
         let range = samples.range;
-        let r = thresholds(family, range);
+        let r = thresholds(family, plays, range);
         let first = samples.drive[0];
         let start = |r: &f64| play(first + if saturated { *r } else { 0.0 }, *r, first, range);
-        let mut plays: Vec<f64> = r.iter().map(start).collect();
+        let mut states: Vec<f64> = r.iter().map(start).collect();
         let starts = if family.creeps() && !family.floats() { STARTS } else { 0 };
         let bounded = r.len() * if family.is_cubic() { 3 } else { 1 };
         let width = bounded + 1 + starts;
         let mut fixed = Vec::with_capacity(width * samples.time.len());
         for (u, t) in samples.drive.iter().zip(&samples.time) {
             interrupt::point();
-            for (p, r) in plays.iter_mut().zip(&r) {
+            for (p, r) in states.iter_mut().zip(&r) {
                 *p = play(*p, *r, *u, range);
                 of_play(family, range, *r, *p, &mut |value| fixed.push(value));
             }
@@ -214,7 +217,12 @@ impl<'a> Problem<'a> {
             }
         }
         let unit = samples.y.iter().fold(0.0, |most: f64, y| if y.abs() > most { y.abs() } else { most });
-        Self { samples, family, unit, fixed, width, bounded, grams }
+        Self { samples, family, plays, unit, fixed, width, bounded, grams }
+    }
+
+    /// Thresholds of its plays, V.
+    pub(super) fn thresholds(&self) -> Vec<f64> {
+        thresholds(self.family, self.plays, self.samples.range)
     }
 
     /// z, V, at each sample.
@@ -383,9 +391,14 @@ impl<'a> Problem<'a> {
             };
             of(&simplex(&unknowns, &steps, most, cost).0)
         };
-        let (values, residual) = self.solve(&best, out)?;
+        self.at(best, out)
+    }
+
+    /// The solution with these unknowns, over the samples that are not of fold `out`.
+    pub(super) fn at(&self, shape: Shape, out: Option<usize>) -> Option<Solution> {
+        let (values, residual) = self.solve(&shape, out)?;
         let rms = self.samples.mean_square(&residual, out, self.family.floats()).sqrt();
-        Some(Solution { shape: best, values, residual, rms })
+        Some(Solution { shape, values, residual, rms })
     }
 
     /// Coefficients of a solution: of the plays, A (0 without a state), of 1, of the read-out.

@@ -18,7 +18,7 @@ section! {
     ///
     /// Times in s.
     "hysteresis" ["preisach", "model"], Plain => Hysteresis {
-        /// Intervals per axis of the Preisach plane; the size of the table grows, and the error falls, with the square of this number.
+        /// Intervals per axis of the Preisach plane; the size of the table grows, and the error falls, with the square of this number. If it is not given, a leg model with plays chooses 32, 64 or 128.
         grid: usize = integer(2, MAX_GRID as i64), Default(32), "N" ["n", "cells", "discretization"], 32;
         /// Number of reversals that the controller can store.
         memory: usize = integer(8, 256), Default(64), "" ["depth"], 64;

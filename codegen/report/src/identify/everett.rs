@@ -51,8 +51,10 @@ pub fn run(
         None => Some(identify::choose_grid(&record, drive, dead_time).map_err(refused)?),
     };
     let grid = grid.or(choice.as_ref().map(|c| c.chosen)).unwrap_or_default();
-    let options = identify::Options { dead_time, ..identify::Options::new(grid, drive) };
+    let finest = if choice.is_some() { identify::MAX_GRID } else { grid };
+    let options = identify::Options { dead_time, finest, ..identify::Options::new(grid, drive) };
     let chosen = choose(&record, &options, model).map_err(refused)?;
+    let grid = chosen.model.table.grid;
     let families = families(&chosen, grid);
     let Choice { table: identified, model, scores, .. } = chosen;
     ui.findings(None, &identified.warnings);
