@@ -326,9 +326,8 @@ impl Learnable {
     /// With an integral, none does: T⁻¹ would turn the smallest constant error into a large constant correction, the fades at both ends of a
     /// pass would cut it off, and the next pass would learn from what the cuts leave.
     fn lower_end(&self, first: f64, lowest: f64) -> f64 {
-        let at_rest = self.nominal(&[REST * lowest]);
-        let all = first <= lowest && at_rest.iter().all(|response| responds(&inverse(response)));
-        if all { 0.0 } else { first }
+        let respond_at_rest = || self.nominal(&[REST * lowest]).iter().all(|response| responds(&inverse(response)));
+        if first <= lowest && respond_at_rest() { 0.0 } else { first }
     }
 
     /// By the model, at each frequency (Hz): T⁻¹, the share of it used, and the largest radius over the machines within `factors`.
