@@ -59,8 +59,7 @@ impl Compilation {
     /// Emits the workspace, with the program of the spec's board if it has one: path, text. Most commands need no text.
     #[must_use]
     pub fn files(&self) -> BTreeMap<String, String> {
-        let target = Target::of(self.model.target.mcu);
-        workspace::files_with(&self.ir, &emit::emit(&self.ir), &[target.name])
+        workspace::files_with(&self.ir, &emit::emit(&self.ir), &[Target::of(self.model.target.mcu).name])
     }
 
     /// Requirements that the spec does not meet although it compiles. `check` and `build` report them as errors; a
