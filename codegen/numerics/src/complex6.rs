@@ -1,5 +1,6 @@
-//! Complex 6×6 matrices.
+//! 6×6 matrices, complex and real.
 
+use crate::Matrix6;
 use crate::nyquist::{Complex, over, plus, square, times};
 
 /// Number of squarings for the bound of the spectral radius: ‖M³²‖^(1/32).
@@ -14,6 +15,12 @@ pub fn left(product: &Matrix6c, share: f64) -> Matrix6c {
     std::array::from_fn(|i| {
         std::array::from_fn(|j| [f64::from(i == j) - share * product[i][j][0], -share * product[i][j][1]])
     })
+}
+
+/// matrix · vector.
+#[must_use]
+pub fn mapped(matrix: &Matrix6, vector: &[f64; 6]) -> [f64; 6] {
+    matrix.map(|row| row.iter().zip(vector).map(|(factor, value)| factor * value).sum())
 }
 
 /// a b.

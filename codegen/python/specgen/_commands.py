@@ -502,7 +502,7 @@ def learn(
         passes: Number of learning passes; 5 if not given.
         bandwidth: Highest frequency to learn, Hz; lowered until learning converges on every machine within ``[robust]``.
         vary: Ranges instead of those of ``[robust]``: ``{"stiffness": "2%"}``.
-        prepare: Start from the correction that the model predicts: it compensates lag and platform modes.
+        prepare: Start from the correction that the model predicts for lag, modes and hysteresis.
         start: Start from this correction, of the same spec, machine and motion.
         excite: Do not learn: measure the response of the running loop, and write it to this file.
         response: Learn with this measured response instead of the model's.

@@ -13,7 +13,7 @@ use specgen_runtime::{Dac, Legs, PermittedRange, Real};
 
 use crate::InvalidIr;
 use crate::convert::Convert;
-use crate::memory::{Memory, Table, models};
+use crate::memory::{Memory, Table, at_rest, models};
 
 /// A scalar type of a controller.
 pub trait Number: Real + Debug + Send + Sync + 'static {}
@@ -165,13 +165,8 @@ impl<T: Real + Debug> Common<T> {
         let (memory, displacement, code) = match &ir.supervision.risen {
             None => (Box::new(fresh), [T::ZERO; LEGS], a.code_min),
             Some(rest) => {
-                let drive = convert.real(rest.drive);
                 let displacement = convert.vector(&rest.displacement);
-                let rate = convert.vector(&rest.rate);
-                let parts = convert.matrix(&rest.bouc_wen.unwrap_or_default());
-                let risen =
-                    std::array::from_fn(|leg| fresh[leg].risen(drive, displacement[leg], rate[leg], parts[leg]));
-                (Box::new(risen), displacement, ir.supervision.rest)
+                (Box::new(at_rest(fresh, convert, rest)), displacement, ir.supervision.rest)
             }
         };
         Ok(Self {

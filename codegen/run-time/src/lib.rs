@@ -29,6 +29,7 @@ use specgen_ir::{Ir, Scalar};
 use specgen_runtime::Motion;
 
 use convert::Convert;
+pub use memory::ModelLegs;
 
 /// The controller of a compiled spec, with the spec's configuration and the power-up state.
 ///

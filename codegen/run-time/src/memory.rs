@@ -4,7 +4,7 @@ use std::convert::Infallible;
 use std::fmt::Debug;
 
 use specgen_ir::scalar::{Numbers as _, kept};
-use specgen_ir::{self as ir, Hysteresis, LEGS, RateModel};
+use specgen_ir::{self as ir, Hysteresis, Ir, LEGS, RateModel, Rest};
 use specgen_law::LegMemory;
 use specgen_runtime::snapshot::{Field, InvalidState, Reader, WordSink};
 use specgen_runtime::{
@@ -209,6 +209,65 @@ pub fn models<T: Real>(convert: &Convert<T>, h: &Hysteresis) -> Result<LegModels
         }
         Some(RateModel::BoucWen { legs }) => with_bouc_wen(convert, &tables, legs)?,
     })
+}
+
+/// Those memories at power-up: risen to the rest of the spec.
+pub fn at_rest<T: Real>(fresh: [Memory<T>; LEGS], convert: &Convert<T>, rest: &Rest) -> [Memory<T>; LEGS] {
+    let drive = convert.real(rest.drive);
+    let displacement = convert.vector(&rest.displacement);
+    let rate = convert.vector(&rest.rate);
+    let parts = convert.matrix(&rest.bouc_wen.unwrap_or_default());
+    std::array::from_fn(|leg| fresh[leg].risen(drive, displacement[leg], rate[leg], parts[leg]))
+}
+
+/// The leg models of a spec on their own, from power-up on. Their tables stay in memory to the end of the process.
+#[derive(Debug, Clone)]
+pub struct ModelLegs {
+    tables: [Table<f64>; LEGS],
+    memory: [Memory<f64>; LEGS],
+}
+
+impl ModelLegs {
+    /// Six legs at the rest of the spec.
+    ///
+    /// # Errors
+    /// The IR is not one from the compiler.
+    pub fn of(ir: &Ir) -> Result<Self, InvalidIr> {
+        let convert = Convert::new();
+        let (tables, fresh) = models(&convert, &ir.hysteresis)?;
+        let memory = match &ir.supervision.risen {
+            None => fresh,
+            Some(rest) => at_rest(fresh, &convert, rest),
+        };
+        convert.finish()?;
+        Ok(Self { tables, memory })
+    }
+
+    /// The drives last applied, cells of the table.
+    #[must_use]
+    pub fn drives(&self) -> [f64; LEGS] {
+        self.memory.each_ref().map(|memory| each!(memory, memory => memory.drive()))
+    }
+
+    /// The displacements at the end of the last tick, m.
+    #[must_use]
+    pub fn displacements(&self) -> [f64; LEGS] {
+        self.memory.each_ref().map(|memory| each!(memory, memory => memory.displacement()))
+    }
+
+    /// A tick with the drives that end at `displacements` (m, finite), as near as the tables reach.
+    pub fn follow(&mut self, displacements: &[f64; LEGS]) {
+        for ((memory, table), wanted) in self.memory.iter_mut().zip(&self.tables).zip(displacements) {
+            memory.follow_within(table, *wanted, |drive| drive);
+        }
+    }
+
+    /// A tick with `drives` (cells, finite).
+    pub fn apply(&mut self, drives: &[f64; LEGS]) {
+        for ((memory, table), drive) in self.memory.iter_mut().zip(&self.tables).zip(drives) {
+            memory.apply(table, *drive);
+        }
+    }
 }
 
 /// Tables of the legs; legs with the same table share its memory.

@@ -13,6 +13,7 @@ mod coherence;
 mod convergence;
 mod excitation;
 mod gain;
+mod legs;
 mod modes;
 mod motion;
 mod observation;
@@ -26,6 +27,7 @@ mod update;
 
 pub use convergence::{Convergence, LARGEST_RADIUS, Learnable};
 pub use excitation::{Excitation, PASSES, SweepSpectra};
+pub use legs::HystereticLegs;
 pub use modes::ModeMeasurement;
 pub use motion::Motion;
 pub use observation::PassObservation;

@@ -15,7 +15,7 @@ use serde_json::Value;
 
 use specgen_compiler::compile::Compilation;
 use specgen_language::interrupt;
-use specgen_language::outcome::{Failure, Outcome};
+use specgen_language::outcome::{Failure, Outcome, environment};
 use specgen_language::output::{check_input, check_place, write_file};
 use specgen_language::table::{left, right, row};
 use specgen_language::ui::Ui;
@@ -24,7 +24,7 @@ use specgen_runtime::playback::Knot;
 use crate::controllers::at_run_time;
 use crate::factors::{Factors, UserRange};
 use crate::learning::{
-    Convergence, Ending, LearnError, Learnable, Learner, LearningResult, Motion, NOWHERE, Pass, Plan,
+    Convergence, Ending, HystereticLegs, LearnError, Learnable, Learner, LearningResult, Motion, NOWHERE, Pass, Plan,
     RepeatableMachine, Response, Table, Update, course, knots, larger_limit, largest_correction, learn,
     takes_correction,
 };
@@ -366,7 +366,9 @@ fn begin(
     let period = compiled.model.timing.period;
     let spacing = convergence.spacing(period);
     if options.prepare {
-        return Ok((knots(&Update::prepared(learnable, motion, convergence.band[1]), spacing), spacing));
+        let legs = HystereticLegs::of(compiled, learnable, motion).map_err(environment)?;
+        let prepared = Update::prepared(learnable, motion, convergence.band[1], legs.as_ref());
+        return Ok((knots(&prepared, spacing), spacing));
     }
     let Some(path) = &options.from else { return Ok((Vec::new(), spacing)) };
     let table = Table::of_file(path).map_err(|error| Failure::Gate(format!("{}: {error}", path.display())))?;

@@ -156,7 +156,7 @@ pub fn on_board(compiled: &Compilation, selector: u32) -> Option<OnBoard> {
 }
 
 /// Pose of the user's zero: the bias plus the offset of the work frame.
-fn bias(task: &TaskSpace) -> [f64; 6] {
+pub(crate) fn bias(task: &TaskSpace) -> [f64; 6] {
     let mut bias = task.setpoint.bias;
     for (value, offset) in bias.iter_mut().zip(&task.frames.work[..3]) {
         *value += offset;

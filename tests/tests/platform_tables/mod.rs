@@ -11,6 +11,7 @@ mod learning;
 mod limits;
 mod non_repeating;
 mod oracle;
+mod prepared;
 mod response;
 mod rest;
 mod steps;

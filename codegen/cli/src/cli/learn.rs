@@ -40,7 +40,7 @@ pub struct Arguments {
     /// Range of an uncertainty, instead of that of [robust] or the default: `stiffness=2%`, `gain=0.9:1.1`, `delay_ticks=0`.
     #[arg(long, value_name = "NAME=RANGE", value_parser = UserRange::parse)]
     vary: Vec<UserRange>,
-    /// Start from the correction that the model predicts: it compensates lag and platform modes.
+    /// Start from the correction that the model predicts for lag, modes and hysteresis.
     #[arg(long, conflicts_with = "from")]
     prepare: bool,
     /// Start from this correction, of the same spec, machine and motion.

@@ -20,8 +20,8 @@ use super::motion::Motion;
 use super::passes::{LearnError, ONSET, RepeatableMachine, followed, given, unlimited};
 use super::response::{Bin, Response};
 use super::table::knots;
-use super::update::{kept, mapped};
-use specgen_numerics::complex6::{Matrix6c, inverse, multiply};
+use super::update::kept;
+use specgen_numerics::complex6::{Matrix6c, inverse, mapped, multiply};
 
 /// A conference matrix: orthogonal rows of signs with one zero each.
 const CONFERENCE: [[i8; 6]; 6] = [

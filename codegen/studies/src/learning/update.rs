@@ -7,12 +7,15 @@ use specgen_numerics::fft::{self, Complex64, Fft};
 
 use super::coherence::Coherence;
 use super::convergence::{Convergence, Learnable, highest, low_pass};
+use super::legs::HystereticLegs;
 use super::motion::Motion;
 use specgen_numerics::Matrix6;
-use specgen_numerics::complex6::{Matrix6c, inverse};
+use specgen_numerics::complex6::{Matrix6c, inverse, mapped};
 
 /// Fade-in and fade-out time of a correction, s.
 pub(super) const FADE: [f64; 2] = [5e-3, 20e-3];
+/// Rounds in which a correction is prepared for hysteretic legs.
+const ROUNDS: usize = 12;
 
 /// Update of a correction between passes of one length.
 pub struct Update {
@@ -81,17 +84,21 @@ impl Update {
         }
     }
 
-    /// A correction that compensates lag and modes by the model, before the first pass.
+    /// A correction that compensates lag, modes and hysteresis by the model, before the first pass.
     ///
     /// ```text
-    /// c = Q G⁻¹ (x_d − G r)      r = x_d + τ Δx_d/T_s + ẍ_d/ω², per mode: the request to the legs with lead and load
+    /// c = Q G⁻¹ (x_d − G (r + d))    r = x_d + τ Δx_d/T_s + ẍ_d/ω², per mode: the request to the legs with lead and load
     /// ```
     /// G is the open-loop channel from the request to the pose, with the structural modes of the legs that are known, and Q that of f_c
-    /// (Hz), without phase.
+    /// (Hz), without phase. d is what hysteretic `legs` do differently under r + c: c is found in rounds. Without `legs`, d = 0.
     #[must_use]
-    pub fn prepared(learnable: &Learnable, motion: &Motion, bandwidth: f64) -> Vec<[f64; 6]> {
+    pub fn prepared(
+        learnable: &Learnable,
+        motion: &Motion,
+        bandwidth: f64,
+        legs: Option<&HystereticLegs>,
+    ) -> Vec<[f64; 6]> {
         let learnable = &learnable.of_pose();
-        let closed_loop = &learnable.closed_loop;
         let update = Self::of(learnable, motion, bandwidth, 1, |frequencies| {
             let channel = learnable.open_loop(frequencies);
             channel
@@ -101,12 +108,18 @@ impl Update {
                 .collect()
         });
         let [wanted, requests] = requested(learnable, motion);
-        let shown = closed_loop.without_feedback(&requests);
-        let error: Vec<[f64; 6]> =
-            wanted.iter().zip(&shown).map(|(a, b)| std::array::from_fn(|mode| a[mode] - b[mode])).collect();
-        let missed = update.transformed(error);
-        let zeros = vec![[0.0; 6]; motion.corrected];
-        update.corrected(&update.spectra(&zeros), &missed, zeros.len())
+        let zeros = update.spectra(&vec![[0.0; 6]; motion.corrected]);
+        let correction = |requests: &[[f64; 6]]| {
+            let shown = learnable.closed_loop.without_feedback(&requests[..motion.corrected]);
+            let error = wanted.iter().zip(&shown).map(|(a, b)| std::array::from_fn(|mode| a[mode] - b[mode]));
+            update.corrected(&zeros, &update.transformed(error.collect()), motion.corrected)
+        };
+        let mut found = correction(&requests);
+        for _ in 0..legs.map_or(0, |_| ROUNDS) {
+            let given = sum(&requests, &found.iter().map(|pose| mapped(&update.to_modal, pose)).collect::<Vec<_>>());
+            found = correction(&sum(&requests, &legs.map_or_else(Vec::new, |legs| legs.excess(&given))));
+        }
+        found
     }
 
     /// The next correction, from the one played and the errors measured under it, pass by pass and tick by tick, m and rad. Learns only
@@ -216,6 +229,15 @@ impl Update {
     }
 }
 
+/// Sum of two signals, of which the second may be shorter.
+fn sum(whole: &[[f64; 6]], part: &[[f64; 6]]) -> Vec<[f64; 6]> {
+    let mut sum = whole.to_vec();
+    for (sum, part) in sum.iter_mut().zip(part) {
+        sum.iter_mut().zip(part).for_each(|(sum, part)| *sum += part);
+    }
+    sum
+}
+
 /// Pose from the start, and the request to the legs with lead and load, tick by tick in modal coordinates.
 fn requested(learnable: &Learnable, motion: &Motion) -> [Vec<[f64; 6]>; 2] {
     let closed_loop = &learnable.closed_loop;
@@ -224,7 +246,7 @@ fn requested(learnable: &Learnable, motion: &Motion) -> [Vec<[f64; 6]>; 2] {
     let lead = learnable.lead / closed_loop.period;
     let mut last = [0.0; 6];
     let mut all = [const { Vec::new() }; 2];
-    for target in &motion.targets[..motion.corrected] {
+    for target in &motion.targets {
         let place = modal(&std::array::from_fn(|axis| target.pose[axis] - start[axis]));
         let bend = modal(&target.acceleration);
         let request = std::array::from_fn(|mode| {
@@ -253,10 +275,6 @@ pub(super) fn kept(cycles: f64) -> f64 {
     let part = if angle > 0.0 { libm::sin(angle) / angle } else { 1.0 };
     let square = part * part;
     if square > 0.5 { square } else { 0.5 }
-}
-
-pub(super) fn mapped(matrix: &Matrix6, vector: &[f64; 6]) -> [f64; 6] {
-    matrix.map(|row| row.iter().zip(vector).map(|(factor, value)| factor * value).sum())
 }
 
 #[cfg(test)]
@@ -316,6 +334,7 @@ mod tests {
         let step = Step { to: [1e-6, 0.0, 0.0, 0.0, 2e-6, 0.0], time: 5e-3 };
         let motion = Motion::of(&step, PERIOD, &SPEED, RADIUS).unwrap();
         let [wanted, requests] = requested(&learnable, &motion);
+        let requests = &requests[..motion.corrected];
         let basis = &learnable.closed_loop.basis;
         // rms error of the open loop, nm.
         let left = |real: &[(f64, f64)], known: &[(f64, f64)]| {
@@ -327,7 +346,7 @@ mod tests {
             });
             let mut modelled = learnable.clone();
             modelled.closed_loop.structure = structure.collect();
-            let correction = Update::prepared(&modelled, &motion, 800.0);
+            let correction = Update::prepared(&modelled, &motion, 800.0, None);
             let given: Vec<[f64; 6]> = requests
                 .iter()
                 .zip(&correction)
