@@ -97,7 +97,7 @@ fn a_leg_that_is_short_of_voltage_is_said_to_be_at_its_limit() {
     assert!(run.stdout.contains(", a leg at its limit in "), "{}", run.stdout);
 }
 
-/// Ten in the short run; 34 on legs of each class in the full one.
+/// Ten in the short run; 100 on legs of each class in the full one.
 #[test]
 fn random_machines_with_a_mode_soft_joints_a_cable_mains_drift_and_jitter_are_stable() {
     let folder = Folder::new();
@@ -111,14 +111,14 @@ fn random_machines_with_a_mode_soft_joints_a_cable_mains_drift_and_jitter_are_st
     for plant in length(&["plays"][..], &["plays", "bouc-wen", "widening.json"]) {
         let study = |structure: &str| {
             let vary = format!("structure={structure}");
-            let draws = length("10", "34");
+            let draws = length("10", "100");
             let arguments = ["robust", spec, "--draws", draws, "--vary", &vary, "--seed", "3", "--plant", plant];
             let report = folder.json(&arguments).value["result"].clone();
             let runs = report["runs"].as_array().unwrap().clone();
             runs.iter().filter(|run| run["drawn"] == true).map(|run| run["outcome"]["ran"].clone()).collect::<Vec<_>>()
         };
         let (with, without) = (study("1"), study("0"));
-        assert_eq!(with.len(), length(10, 34));
+        assert_eq!(with.len(), length(10, 100));
         let mut ratios: Vec<f64> = with
             .iter()
             .zip(&without)

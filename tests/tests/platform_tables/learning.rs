@@ -372,14 +372,14 @@ fn both_classes_of_legs_are_learned() {
 }
 
 #[test]
-#[ignore = "long: learning on 34 machines drawn from the intervals of [robust]"]
+#[ignore = "long: learning on 100 machines drawn from the intervals of [robust]"]
 fn every_machine_within_the_intervals_learns() {
     let bench = plays();
     let model = &bench.emitted.compiled.model;
     let task = model.task_space.as_ref().unwrap();
     let design = design(bench);
     let factors = Factors::of(model, &[]);
-    let found = in_parallel(34, |seed| {
+    let found = in_parallel(100, |seed| {
         let deviation = Deviation::drawn(&factors, u64::from(seed));
         let leg = if seed % 2 == 0 { LegParameters::reference() } else { LegParameters::bouc_wen() };
         let specimen = deviation.specimen(model, task, &leg);
