@@ -11,6 +11,7 @@ use specgen::identify::leg_model::{Choice, choose};
 use specgen::identify::rate::RateModel;
 use specgen::identify::{Drive, Options, Record, parse_record, predict};
 use specgen::model::LegModelKind as Kind;
+use specgen_tests::length;
 
 use crate::platform_tables::bench::in_parallel;
 

@@ -9,7 +9,7 @@ use crate::rate::period::{INVERTED, Invertible};
 use crate::rate::{CreepTerm, Inertia, RateModel};
 use crate::{Options, Report, is_simulated, is_table_csv, parse_record, rate, read_file, read_leg_csv};
 use specgen_language::diagnostic::{Code, Diagnostic, Place, codes};
-use specgen_language::model::{Hysteresis, MAX_GRID, Model, RateDependence, Scalar};
+use specgen_language::model::{Hysteresis, MAX_GRID, Mcu, Model, RateDependence, Scalar};
 use specgen_language::spec::LegLines;
 
 /// Largest ratio of a record's displacement to that of stack gain and voltage: creep and a rough data sheet explain
@@ -67,11 +67,11 @@ pub fn records(model: &Model, dir: &Path) -> Result<SpecRecords, Vec<Diagnostic>
     Err(errors)
 }
 
-/// The finest grid that a leg model may choose: that of the spec if it gives one, otherwise with tables in at most half of
-/// the flash.
+/// The finest grid that a leg model may choose: that of the spec if it gives one or is for a board, whose fast memory holds
+/// no larger tables of six legs; otherwise with tables in at most half of the flash.
 fn finest(model: &Model) -> usize {
     let Hysteresis { grid, records, .. } = &model.hysteresis;
-    if model.spans.contains_key("hysteresis.grid") {
+    if model.spans.contains_key("hysteresis.grid") || matches!(model.target.mcu, Mcu::Board(_)) {
         return *grid;
     }
     let scalar = if model.controller.scalar == Scalar::F32 { 4 } else { 8 };

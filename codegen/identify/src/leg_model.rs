@@ -27,6 +27,7 @@ use crate::regressor::{self, Plane};
 
 pub use families::{Choice, FamilyScore, choose};
 pub use family::Family;
+pub(crate) use family::TIMES;
 pub use file::{read_leg_csv, write_leg_csv};
 
 /// Number of coefficients of a read-out: powers 1 to 5.

@@ -6,7 +6,7 @@ use super::READ_OUT;
 use specgen_language::model::LegModelKind as Kind;
 
 /// Time constants of the creep, s: a decade apart.
-pub(super) const TIMES: [f64; 5] = [100.0, 10.0, 1.0, 0.1, 0.01];
+pub(crate) const TIMES: [f64; 5] = [100.0, 10.0, 1.0, 0.1, 0.01];
 
 /// A family of models.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

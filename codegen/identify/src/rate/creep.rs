@@ -31,7 +31,7 @@ const WORTHWHILE: f64 = 2e-4;
 /// Fits creep after the table and dead time of `start`.
 pub(super) fn fit(tables: &Tables, start: &RateModel) -> Result<RateModel, Failure> {
     let (plane, records) = (tables.plane, tables.records);
-    let times = time_constants(records, false);
+    let times = time_constants(records);
     let mut model = start.clone();
     let mut before = f64::INFINITY;
     for _ in 0..TURNS {
@@ -61,12 +61,12 @@ pub(super) fn fit(tables: &Tables, start: &RateModel) -> Result<RateModel, Failu
     Ok(model)
 }
 
-/// Evenly spaced in their logarithm, slowest first, s. For equal weights, as many as a controller takes.
-pub(super) fn time_constants(records: &[&PreparedRecord], even: bool) -> Vec<f64> {
+/// Evenly spaced in their logarithm, slowest first, s.
+pub(super) fn time_constants(records: &[&PreparedRecord]) -> Vec<f64> {
     let longest = records.iter().map(|p| p.duration()).fold(0.0, |a, b| if b > a { b } else { a }) * LONGEST;
     let shortest = records.iter().map(|p| p.interval).fold(longest, |a, b| if b < a { b } else { a }) * SHORTEST;
     let shortest = if shortest < longest { shortest } else { 0.1 * longest };
-    let wanted = if even { TERMS[1] } else { libm::ceil(libm::log10(longest / shortest)) + 1.0 };
+    let wanted = libm::ceil(libm::log10(longest / shortest)) + 1.0;
     let terms = crate::staircase::saturate(wanted, TERMS) as usize;
     let ratio = libm::log(shortest / longest) / (terms - 1) as f64;
     (0..terms).map(|k| rounded(longest * libm::exp(ratio * k as f64))).collect()

@@ -13,6 +13,7 @@ use super::start::RecordColumns;
 use super::table::Tables;
 use super::{CreepTerm, Inertia, RateModel, creep};
 use crate::least_squares::dot;
+use crate::leg_model::TIMES;
 use crate::mixed;
 use crate::mode::Mode;
 use specgen_numerics::nnls::Failure;
@@ -51,7 +52,7 @@ struct Fit<'a> {
 /// Fits `shape` after a table, starting from the table and dead time of `start`.
 pub(super) fn fit(tables: &Tables, start: &RateModel, shape: Shape) -> Result<RateModel, Failure> {
     let records = tables.records;
-    let times = creep::time_constants(records, shape.even);
+    let times = if shape.even { TIMES.to_vec() } else { creep::time_constants(records) };
     let own = records.iter().map(|p| p.own(&times, shape.mode)).collect();
     let fit = Fit { tables, own, times, shape };
     let weights = if shape.even { 1 } else { fit.times.len() };
