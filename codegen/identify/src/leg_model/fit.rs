@@ -157,7 +157,6 @@ pub(super) struct Solution {
     pub(super) rms: f64,
 }
 
-
 /// Columns of a play at `p` with threshold `r`: p itself, or the integrals of the three Bernstein polynomials of degree 2
 /// over its range, which rise.
 pub(super) fn of_play(family: Family, range: [f64; 2], r: f64, p: f64, write: &mut impl FnMut(f64)) {
