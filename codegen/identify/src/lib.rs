@@ -92,7 +92,7 @@ pub use statistics::extent;
 pub struct Options {
     /// N, intervals per axis, 2 to [`MAX_GRID`].
     pub grid: usize,
-    /// Finest grid that a leg model with plays may choose, `grid` doubled once or more; no finer one if it is less than that.
+    /// Grid of a leg model with plays, if it can be inverted there: `grid`, doubled or not.
     pub finest: usize,
     /// Range of the thresholds [lowest, highest], V.
     pub drive: [f64; 2],

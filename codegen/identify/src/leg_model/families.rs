@@ -137,7 +137,7 @@ fn chosen(
     if family.is_table() {
         chosen.model = Some(LegModel { table: table.table.clone(), around: None });
     }
-    Some((family, data.on_grid(chosen, folds, options)?, scores))
+    Some((family, data.on_grid(chosen, options)?, scores))
 }
 
 /// A record for all families.
@@ -220,36 +220,25 @@ impl<'a> Data<'a> {
         Some(Candidate { family, model, squares, fitted: Some((saturated, solution.shape)) })
     }
 
-    /// The chosen model on the grid of the controller, with at least as many plays as cells: of `options.grid` and its doubles
-    /// to `options.finest`, the coarsest whose error on curves that were held out exceeds that of the best by at most one
-    /// standard error. A model without plays has nothing to show on a finer grid.
-    fn on_grid(&self, chosen: Candidate, folds: usize, options: &crate::Options) -> Option<LegModel> {
+    /// The chosen model on the grid of the controller. Plays are tabulated on the finest grid that is allowed, with as many
+    /// plays as cells: the table is computed from the model, so a finer one is nearer to it. Other tables are interpolated.
+    fn on_grid(&self, chosen: Candidate, options: &crate::Options) -> Option<LegModel> {
         let Candidate { family, model, fitted, .. } = chosen;
         let mut chosen = model?;
-        let finest = if fitted.is_some() && family.has_plays() { options.finest } else { 0 };
-        let Some((saturated, shape)) = fitted.filter(|_| finest > self.plane.grid) else {
-            if options.grid > chosen.table.grid {
-                chosen.table = on_grid(&chosen.table, options.grid);
+        if let Some((saturated, shape)) = fitted.filter(|_| family.has_plays() && options.finest > self.plane.grid) {
+            let halves = core::iter::successors(Some(options.finest), |grid| Some(grid / 2));
+            let finer = halves.take_while(|grid| *grid >= options.grid).find_map(|grid| {
+                let problem = Problem::new(&self.samples, family, if grid > PLAYS { grid } else { PLAYS }, saturated);
+                model_of(&problem, &problem.at(shape, None)?, &Plane { grid, range: self.plane.range })
+            });
+            if finer.is_some() {
+                return finer;
             }
-            return Some(chosen);
-        };
-        let doubles = core::iter::successors(Some(options.grid), |grid| Some(2 * grid));
-        let mut tried: Vec<(LegModel, Vec<f64>)> = Vec::new();
-        for grid in doubles.take_while(|grid| *grid <= finest) {
-            let problem = Problem::new(&self.samples, family, if grid > PLAYS { grid } else { PLAYS }, saturated);
-            let fitted = problem.at(shape, None);
-            let model = fitted.and_then(|fitted| model_of(&problem, &fitted, &Plane { grid, range: self.plane.range }));
-            let squares = (0..folds).map(|fold| Some(self.square(fold, &problem.at(shape, Some(fold))?.residual)));
-            tried.extend(model.zip(squares.collect::<Option<Vec<f64>>>()));
         }
-        let best = tried.iter().map(|(_, squares)| squares).reduce(|a, b| if mean(b) < mean(a) { b } else { a });
-        let Some(best) = best.cloned() else { return Some(chosen) };
-        let coarsest = tried.into_iter().find(|(_, squares)| {
-            let worse: Vec<f64> = squares.iter().zip(&best).map(|(a, b)| a.sqrt() - b.sqrt()).collect();
-            let (excess, error) = mean_and_error(&worse);
-            excess <= error
-        });
-        Some(coarsest?.0)
+        if options.grid > chosen.table.grid {
+            chosen.table = on_grid(&chosen.table, options.grid);
+        }
+        Some(chosen)
     }
 
     /// Everett tables, after creep of the level that plays show.
