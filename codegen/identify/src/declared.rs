@@ -71,7 +71,9 @@ pub fn records(model: &Model, dir: &Path) -> Result<SpecRecords, Vec<Diagnostic>
 /// no larger tables of six legs; otherwise with tables in at most half of the flash.
 fn finest(model: &Model) -> usize {
     let Hysteresis { grid, records, .. } = &model.hysteresis;
-    if model.spans.contains_key("hysteresis.grid") || matches!(model.target.mcu, Mcu::Board(_)) {
+    // A default value has the place of its section.
+    let given = model.spans.get("hysteresis.grid") != model.spans.get("hysteresis");
+    if given || matches!(model.target.mcu, Mcu::Board(_)) {
         return *grid;
     }
     let scalar = if model.controller.scalar == Scalar::F32 { 4 } else { 8 };
