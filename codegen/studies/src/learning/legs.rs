@@ -4,6 +4,7 @@
 //! assumes, and its slope is not the one for which the lag is compensated.
 
 use specgen_compiler::compile::Compilation;
+use specgen_numerics::complex6::mapped;
 use specgen_numerics::{Matrix6, multiply6};
 use specgen_run_time::{InvalidIr, ModelLegs, dynamics};
 use specgen_runtime::Motion as Place;
@@ -11,7 +12,6 @@ use specgen_runtime::Motion as Place;
 use super::convergence::Learnable;
 use super::motion::Motion;
 use crate::machine::bias;
-use specgen_numerics::complex6::mapped;
 
 /// Ticks in which the legs rise to the start of a motion.
 const RISE: u32 = 5000;
