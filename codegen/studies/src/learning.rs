@@ -13,7 +13,9 @@ mod coherence;
 mod convergence;
 mod excitation;
 mod gain;
+mod learner;
 mod legs;
+mod machine;
 mod modes;
 mod motion;
 mod observation;
@@ -27,13 +29,13 @@ mod update;
 
 pub use convergence::{Convergence, LARGEST_RADIUS, Learnable};
 pub use excitation::{Excitation, PASSES, SweepSpectra};
+pub use learner::Learner;
 pub use legs::HystereticLegs;
+pub use machine::{LearnError, RepeatableMachine, error_by_tick, pass_timing};
 pub use modes::ModeMeasurement;
 pub use motion::Motion;
 pub use observation::PassObservation;
-pub use passes::{
-    Ending, LearnError, Learner, LearningResult, Pass, RepeatableMachine, course, held, learn, translation_nm,
-};
+pub use passes::{Ending, LearningResult, Pass, learn, translation_nm};
 pub use plan::Plan;
 pub use refusal::{NOWHERE, larger_limit, largest_correction, takes_correction};
 pub use response::{Bin, Response};

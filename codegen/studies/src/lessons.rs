@@ -25,7 +25,7 @@ use crate::controllers::at_run_time;
 use crate::factors::{Factors, UserRange};
 use crate::learning::{
     Convergence, Ending, HystereticLegs, LearnError, Learnable, Learner, LearningResult, Motion, NOWHERE, Pass, Plan,
-    RepeatableMachine, Response, Table, Update, course, knots, larger_limit, largest_correction, learn,
+    RepeatableMachine, Response, Table, Update, knots, larger_limit, largest_correction, learn, pass_timing,
     takes_correction,
 };
 use crate::machine::{PlantOptions, run_failure};
@@ -196,7 +196,7 @@ impl MachineSource for SimulatedMachine<'_> {
         bench.arm(ARMING).map_err(gate)?;
         let found = match work(&mut bench, ui) {
             Ok(done) => Some(keep(done, ui)?),
-            Err(LearnError::Ended) => None,
+            Err(LearnError::Interruption) => None,
             Err(error) => return Err(gate(error)),
         };
         Ok(SessionResult { found, why: None, down: String::new() })
@@ -293,7 +293,7 @@ fn keep(
         let names = [compiled.ir.digest.as_str(), machine_name, motion_name];
         let mut knots = learned.knots.clone();
         // Nothing was learned and nothing given: write a correction of zeros, which has no effect.
-        knots.resize(course(motion, *spacing, 0).knots() as usize, [0; 6]);
+        knots.resize(pass_timing(motion, *spacing, 0).knots() as usize, [0; 6]);
         let zeros = if knots.iter().all(|knot| *knot == [0; 6]) { ", all zero," } else { "" };
         let table = Table::new(names, [*spacing, motion.scored.start as u32], start, knots);
         write_file(path, table.to_json().as_bytes())?;

@@ -7,7 +7,9 @@ use specgen_compiler::ir::Path as Poses;
 use specgen_link::client::Port;
 use specgen_runtime::playback::Knot;
 use specgen_runtime::supervisor::{Phase, Request};
-use specgen_studies::learning::{LearnError, Motion, PassObservation, Plan, RepeatableMachine, course, held};
+use specgen_studies::learning::{
+    LearnError, Motion, PassObservation, Plan, RepeatableMachine, error_by_tick, pass_timing,
+};
 
 use crate::command::{Command, WaitCondition};
 use crate::commands::{Operator, SessionError};
@@ -91,19 +93,19 @@ impl<P: Port> LinkedMachine<'_, P> {
     /// Keeps the error that ended a pass.
     pub fn ended(&mut self, error: SessionError) -> LearnError {
         self.error = Some(error);
-        LearnError::Ended
+        LearnError::Interruption
     }
 }
 
 impl<P: Port> RepeatableMachine for LinkedMachine<'_, P> {
     fn pass(&mut self, motion: &Motion, knots: &[Knot], spacing: u32) -> Result<PassObservation, LearnError> {
-        let course = course(motion, spacing, self.own.number);
+        let timing = pass_timing(motion, spacing, self.own.number);
         // Do not resend a correction that the device has.
         let sent = if self.has.as_deref() == Some(knots) { None } else { Some(knots) };
-        match self.operator.pass(&self.own.start, course, sent, self.ui) {
+        match self.operator.pass(&self.own.start, timing, sent, self.ui) {
             Ok(passed) => {
                 self.has = Some(knots.to_vec());
-                let measured = held(&passed.errors, spacing, motion.corrected);
+                let measured = error_by_tick(&passed.errors, spacing, motion.corrected);
                 Ok(PassObservation { real: measured.clone(), measured, kept: passed.errors, status: passed.status })
             }
             Err(error) => Err(self.ended(error)),
@@ -130,7 +132,7 @@ impl<P: Port> RepeatableMachine for LinkedMachine<'_, P> {
         if self.has.as_deref() == Some(knots) {
             return Ok(());
         }
-        let course = course(motion, spacing, self.own.number);
-        self.operator.correct(knots, course).map_err(|error| self.ended(error))
+        let timing = pass_timing(motion, spacing, self.own.number);
+        self.operator.correct(knots, timing).map_err(|error| self.ended(error))
     }
 }

@@ -16,8 +16,9 @@ use specgen_numerics::nyquist::{Complex, plus, times};
 use specgen_runtime::playback::Knot;
 
 use super::convergence::{Learnable, spacing};
+use super::learner::{ONSET, correction_by_tick};
+use super::machine::{LearnError, RepeatableMachine, require_followed, require_unlimited};
 use super::motion::Motion;
-use super::passes::{LearnError, ONSET, RepeatableMachine, followed, given, unlimited};
 use super::response::{Bin, Response};
 use super::table::knots;
 use super::update::kept;
@@ -127,16 +128,16 @@ impl Excitation {
                 values
             })
         };
-        followed(machine.pass(motion, &[], self.spacing)?)?;
+        require_followed(machine.pass(motion, &[], self.spacing)?)?;
         let mut pairs = Vec::with_capacity(PASSES);
         for (number, knots) in self.passes.iter().enumerate() {
             if watch(number).is_break() {
-                return Err(LearnError::Ended);
+                return Err(LearnError::Interruption);
             }
-            let seen = unlimited(followed(machine.pass(motion, knots, self.spacing)?)?)?;
-            let given = given(knots, motion, self.spacing).into_iter();
+            let seen = require_unlimited(require_followed(machine.pass(motion, knots, self.spacing)?)?)?;
+            let correction = correction_by_tick(knots, motion, self.spacing).into_iter();
             let shown = seen.measured[..motion.corrected].iter().map(|error| error.map(|axis| -axis));
-            pairs.push([spectra(&mut { given }), spectra(&mut { shown })]);
+            pairs.push([spectra(&mut { correction }), spectra(&mut { shown })]);
         }
         // Zero padding correlates neighbouring lines.
         let tied = length as f64 / motion.corrected as f64;
