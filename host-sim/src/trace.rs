@@ -12,7 +12,7 @@
 
 use std::fmt::Write;
 
-use crate::description::{Description, DescriptionError};
+use crate::description::Description;
 use crate::word::WordKind;
 
 mod difference;
@@ -29,47 +29,11 @@ pub struct Trace {
     words: Vec<u64>,
 }
 
-/// Reason why a file is not a trace.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum TraceError {
-    /// It does not begin as a trace does.
-    #[error("not a trace: it does not begin with SPGTRACE; record it again")]
-    NotATrace,
-    /// It is of another version of the format.
-    #[error("trace format {0}, expected {VERSION}; record it with this version")]
-    Version(u32),
-    /// It is too short, or continues after its last row.
-    #[error("the trace has {found} bytes, expected {expected}: the recording was cut or mixed; record it again")]
-    Length {
-        /// Bytes announced by its header.
-        expected: u64,
-        /// Bytes that it has.
-        found: u64,
-    },
-    /// Its description is unusable.
-    #[error("the trace's header: {0}")]
-    Description(DescriptionError),
-}
-
 impl Trace {
     /// An empty trace of a controller.
     #[must_use]
     pub fn new(description: Description) -> Self {
         Self { description, words: Vec::new() }
-    }
-
-    /// A trace from rows recorded by a target.
-    ///
-    /// # Errors
-    /// If `words` is not a whole number of rows.
-    pub fn from_words(description: Description, words: Vec<u64>) -> Result<Self, TraceError> {
-        let trace = Self { description, words };
-        let width = trace.width();
-        if trace.words.len().is_multiple_of(width) {
-            return Ok(trace);
-        }
-        let found = trace.words.len() as u64 * 8;
-        Err(TraceError::Length { expected: trace.words.len().next_multiple_of(width) as u64 * 8, found })
     }
 
     /// Whose run it is.
@@ -144,37 +108,6 @@ impl Trace {
         out
     }
 
-    /// Reads a file's bytes.
-    ///
-    /// # Errors
-    /// If they are not a complete trace of this version.
-    pub fn from_bytes(bytes: &[u8]) -> Result<Self, TraceError> {
-        let mut rest = bytes;
-        let cut = |expected: u64| TraceError::Length { expected, found: bytes.len() as u64 };
-        if take::<8>(&mut rest) != Some(*MAGIC) {
-            return Err(TraceError::NotATrace);
-        }
-        let version = take(&mut rest).map(u32::from_le_bytes).ok_or(cut(24))?;
-        if version != VERSION {
-            return Err(TraceError::Version(version));
-        }
-        let header = u64::from(take(&mut rest).map(u32::from_le_bytes).ok_or(cut(24))?);
-        let text = rest.split_off(..header as usize).ok_or(cut(24 + header))?;
-        let description = Description::parse(&String::from_utf8_lossy(text)).map_err(TraceError::Description)?;
-        let rows = take(&mut rest).map(u64::from_le_bytes).ok_or(cut(24 + header))?;
-
-        let mut trace = Self::new(description);
-        // Saturating: a damaged count must not wrap around to one that fits.
-        let expected = rows.saturating_mul(trace.width() as u64).saturating_mul(8);
-        if expected != rest.len() as u64 {
-            return Err(cut(expected.saturating_add(24 + header)));
-        }
-        while let Some(word) = take(&mut rest) {
-            trace.words.push(u64::from_le_bytes(word));
-        }
-        Ok(trace)
-    }
-
     /// CSV for reading and plotting: numbers as shortest decimals that give the same bits, integers unchanged, the
     /// digest in hexadecimal; units in the column names.
     #[must_use]
@@ -215,13 +148,6 @@ fn title(name: &str) -> String {
     format!("{name}{unit}")
 }
 
-/// Removes and returns the first `N` bytes.
-fn take<const N: usize>(rest: &mut &[u8]) -> Option<[u8; N]> {
-    let (head, tail) = rest.split_first_chunk::<N>()?;
-    *rest = tail;
-    Some(*head)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -239,38 +165,17 @@ mod tests {
     }
 
     #[test]
-    fn a_trace_reads_back_to_the_word() {
+    fn a_file_has_a_header_the_description_and_every_word() {
         let trace = sample(Scalar::F64);
         let bytes = trace.to_bytes();
-        assert_eq!(bytes.len() % 8, 0);
-        assert_eq!(Trace::from_bytes(&bytes), Ok(trace.clone()));
-        assert_eq!(Trace::from_words(trace.description().clone(), trace.words().to_vec()), Ok(trace));
-    }
-
-    #[test]
-    fn a_damaged_file_is_refused_at_every_length() {
-        let bytes = sample(Scalar::F64).to_bytes();
-        for length in 0..bytes.len() {
-            assert!(Trace::from_bytes(&bytes[..length]).is_err(), "{length}");
-        }
-        let mut longer = bytes.clone();
-        longer.push(0);
-        let error = Trace::from_bytes(&longer).unwrap_err().to_string();
-        assert!(error.contains(&format!("{} bytes, expected {}", bytes.len() + 1, bytes.len())), "{error}");
-        let mut other = bytes.clone();
-        other[8] = 9;
-        assert_eq!(Trace::from_bytes(&other), Err(TraceError::Version(9)));
-        let text = u32::from_le_bytes(bytes[12..16].try_into().unwrap()) as usize;
-        let mut count = bytes;
-        count[16 + text..24 + text].fill(0xff);
-        assert!(matches!(Trace::from_bytes(&count), Err(TraceError::Length { expected: u64::MAX, .. })));
-    }
-
-    #[test]
-    fn half_a_row_is_refused() {
-        let trace = sample(Scalar::F64);
-        let words = trace.words()[..55].to_vec();
-        assert!(Trace::from_words(trace.description().clone(), words).is_err());
+        let word = |at: usize| u64::from_le_bytes(bytes[at..at + 8].try_into().unwrap());
+        assert_eq!((&bytes[..8], word(8) as u32), (&MAGIC[..], VERSION));
+        let rows = 16 + (word(8) >> 32) as usize;
+        let text = std::str::from_utf8(&bytes[16..rows]).unwrap();
+        assert_eq!(Description::parse(text).as_ref(), Ok(trace.description()));
+        assert_eq!(word(rows), 3);
+        let words: Vec<u64> = (rows + 8..bytes.len()).step_by(8).map(word).collect();
+        assert_eq!(words, trace.words());
     }
 
     #[test]

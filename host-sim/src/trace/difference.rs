@@ -111,7 +111,7 @@ mod tests {
         let width = 50;
         let mut words: Vec<u64> = (0..ticks * width).map(|k| scalar.encode(1.0 + k as f64)).collect();
         change(&mut words);
-        Trace::from_words(description, words).unwrap()
+        Trace { description, words }
     }
 
     #[test]
@@ -152,7 +152,7 @@ mod tests {
         assert_eq!(first_difference(&a, &longer).unwrap().to_string(), "length: 3 vs 4 ticks");
         let mut description = six_legs(Scalar::F64);
         description.digest = "01".to_owned();
-        let other = Trace::from_words(description, a.words().to_vec()).unwrap();
+        let other = Trace { description, words: a.words().to_vec() };
         assert_eq!(first_difference(&a, &other).unwrap().to_string(), "header digest: 00 vs 01");
     }
 }
