@@ -170,7 +170,7 @@ fn lookup(x: f64) -> f64 {
     let line = 1 + source.lines().position(|line| line.contains("the test looks for")).unwrap();
     assert!(message.contains(&format!("controller/src/lib.rs:{line}, inlined at ")), "{message}");
     println!("{message}");
-    assert!(!error.is_environment());
+    assert!(!error.is_of_a_tool());
     let error = target::host::build_library(workspace.dir(), &target_dir()).unwrap_err();
     assert!(matches!(error, TargetError::PanicPath { .. }), "{error}");
 }

@@ -106,12 +106,6 @@ pub enum TargetError {
 }
 
 impl TargetError {
-    /// True if the machine is at fault, false if the emitted workspace is (exit codes 3 and 1).
-    #[must_use]
-    pub fn is_environment(&self) -> bool {
-        self.is_of_a_tool() || matches!(self, Self::Io { .. })
-    }
-
     /// True if an optional tool is missing or broken: steps that need it can be skipped.
     #[must_use]
     pub fn is_of_a_tool(&self) -> bool {

@@ -312,7 +312,7 @@ mod tests {
         let root = tempfile::tempdir().unwrap();
         let bare = fake(root.path(), "bare", &[LLD]);
         let error = choose(&[bare], &[]).unwrap_err();
-        assert!(error.is_environment());
+        assert!(error.is_of_a_tool());
         assert!(error.to_string().contains("rustup target add thumbv7em-none-eabihf"), "{error}");
         let no_linker = fake(root.path(), "debian", &[SOURCE]);
         let error = choose(&[no_linker], &[]).unwrap_err();
