@@ -4,6 +4,7 @@ pub mod complete;
 
 use std::ops::Range;
 
+pub use crate::lines::Lines;
 use crate::spec::keys::{self, Key, Section};
 use serde::{Deserialize, Serialize};
 
@@ -23,28 +24,11 @@ pub struct Part {
     pub end: Position,
 }
 
-/// The lines of a text. Editors count lines and UTF-16 units from 0.
-pub struct Lines<'a> {
-    text: &'a str,
-    starts: Vec<usize>,
-}
-
-impl<'a> Lines<'a> {
-    /// Of a text.
-    pub fn new(text: &'a str) -> Self {
-        let breaks = text.bytes().enumerate().filter(|(_, b)| *b == b'\n').map(|(i, _)| i + 1);
-        Self { text, starts: std::iter::once(0).chain(breaks).collect() }
-    }
-
-    /// Position of byte `offset`; a byte within a character counts as its beginning.
-    fn position(&self, offset: usize) -> Position {
-        let mut offset = offset.min(self.text.len());
-        while !self.text.is_char_boundary(offset) {
-            offset -= 1;
-        }
-        // The first line starts at 0, so that there is one at or before `offset`.
-        let line = self.starts.partition_point(|start| *start <= offset) - 1;
-        let column = self.text[self.starts[line]..offset].encode_utf16().count();
+/// Editors count lines and UTF-16 units from 0.
+impl Lines<'_> {
+    fn position(&self, byte: usize) -> Position {
+        let (line, byte) = self.locate(byte);
+        let column = self.text[self.starts[line]..byte].encode_utf16().count();
         Position { line: line as u32, character: column as u32 }
     }
 

@@ -15,6 +15,7 @@ pub mod editor;
 pub mod files;
 pub mod interrupt;
 mod keys;
+mod lines;
 pub mod lock;
 pub mod model;
 pub mod outcome;

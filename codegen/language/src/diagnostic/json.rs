@@ -2,9 +2,9 @@
 
 use serde_json::{Value, json};
 
-use super::position::Lines;
 use super::{Diagnostic, Place, Severity};
 use crate::SpecSource;
+use crate::lines::Lines;
 
 /// An array with one object for each finding: `code`, `severity` ("error", "warning", "note"), `key`, `file`, `line`,
 /// `column`, `message`, `help`. Line and column count from 1, columns in characters; fields that do not apply are null.

@@ -2,12 +2,7 @@
 
 use std::ops::Range;
 
-/// The lines of a text, for finding the line of a byte.
-#[derive(Debug)]
-pub(super) struct Lines<'a> {
-    text: &'a str,
-    starts: Vec<usize>,
-}
+use crate::lines::Lines;
 
 /// Start of a span, and its part on that line.
 #[derive(Debug, PartialEq, Eq)]
@@ -23,19 +18,9 @@ pub(super) struct Spot<'a> {
 }
 
 impl<'a> Lines<'a> {
-    pub(super) fn new(text: &'a str) -> Self {
-        let breaks = text.bytes().enumerate().filter(|(_, b)| *b == b'\n').map(|(i, _)| i + 1);
-        Self { text, starts: std::iter::once(0).chain(breaks).collect() }
-    }
-
     /// Any range: it is limited to the text and to whole characters.
     pub(super) fn spot(&self, span: &Range<usize>) -> Spot<'a> {
-        let mut start = span.start.min(self.text.len());
-        while !self.text.is_char_boundary(start) {
-            start -= 1;
-        }
-        // The first line starts at 0, so there is always one at or before `start`.
-        let index = self.starts.partition_point(|s| *s <= start) - 1;
+        let (index, start) = self.locate(span.start);
         let line_start = self.starts[index];
         let line_end = self.starts.get(index + 1).map_or(self.text.len(), |next| next - 1);
         let line_text = self.text[line_start..line_end].trim_end_matches('\r');

@@ -2,9 +2,10 @@
 
 use annotate_snippets::{AnnotationKind, Group, Level, Origin, Renderer, Snippet};
 
-use super::position::{self, Lines};
+use super::position;
 use super::{Diagnostic, Place, Severity};
 use crate::SpecSource;
+use crate::lines::Lines;
 
 /// Longest part of a line that is shown, characters.
 const MAX_SHOWN: usize = 160;
