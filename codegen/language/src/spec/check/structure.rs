@@ -1,5 +1,6 @@
 //! Modes of the structure, known and not.
 
+use super::trajectories::at_most;
 use crate::diagnostic::codes;
 use crate::keys::fields::Fields;
 use crate::model::structure::place;
@@ -75,15 +76,6 @@ pub(super) fn differ(f: &Fields, findings: &mut Findings) -> Option<()> {
 }
 
 pub(super) fn not_too_many(f: &Fields, findings: &mut Findings) -> Option<()> {
-    let count = f.count("mode");
-    if count > MAX_TABLES {
-        findings.add(
-            codes::TOO_MANY_MODES,
-            "mode",
-            f.table("mode[0]").unwrap_or(0..0),
-            format!("there are {count} structural modes, expected at most {MAX_TABLES}"),
-            "keep those below half the tick rate that have the least damping".to_owned(),
-        );
-    }
-    Some(())
+    let help = "keep those below half the tick rate that have the least damping";
+    at_most(f, findings, codes::TOO_MANY_MODES, ["mode", "structural modes", help])
 }

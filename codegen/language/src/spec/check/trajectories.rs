@@ -1,6 +1,6 @@
 //! The trajectories that the controller can play; the tables of waveforms are read later.
 
-use crate::diagnostic::codes;
+use crate::diagnostic::{Code, codes};
 use crate::keys::fields::Fields;
 use crate::spec::findings::Findings;
 use crate::spec::keys::{self, MAX_TABLES};
@@ -116,15 +116,16 @@ pub(super) fn limits(f: &Fields, findings: &mut Findings) -> Option<()> {
 }
 
 pub(super) fn not_too_many(f: &Fields, findings: &mut Findings) -> Option<()> {
-    let count = f.count("trajectory");
+    let help = "remove some, or join waveforms that are played one after the other";
+    at_most(f, findings, codes::TOO_MANY_TRAJECTORIES, ["trajectory", "trajectories", help])
+}
+
+/// A repeated section has no more than [`MAX_TABLES`] tables.
+pub(super) fn at_most(f: &Fields, findings: &mut Findings, code: Code, of: [&str; 3]) -> Option<()> {
+    let ([section, plural, help], count) = (of, f.count(of[0]));
     if count > MAX_TABLES {
-        findings.add(
-            codes::TOO_MANY_TRAJECTORIES,
-            "trajectory",
-            f.table("trajectory[0]").unwrap_or(0..0),
-            format!("there are {count} trajectories, expected at most {MAX_TABLES}"),
-            "remove some, or join waveforms that are played one after the other".to_owned(),
-        );
+        let message = format!("there are {count} {plural}, expected at most {MAX_TABLES}");
+        findings.add(code, section, f.table(&format!("{section}[0]")).unwrap_or(0..0), message, help.to_owned());
     }
     Some(())
 }
