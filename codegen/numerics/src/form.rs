@@ -5,6 +5,8 @@
 //! instead of almost zero. Affine arithmetic (de Figueiredo, Stolfi) keeps the linear dependence on the pose, and in a
 //! micrometre machine almost everything is linear.
 
+use core::cmp::Ordering;
+
 /// Bound of the rounding of the arithmetic itself, with margin: it is done in doubles.
 const OWN_ROUNDING: f64 = 1e-15;
 
@@ -30,6 +32,11 @@ fn most(values: [f64; 4]) -> f64 {
 pub(crate) fn times(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
     let ends = [a[0] * b[0], a[0] * b[1], a[1] * b[0], a[1] * b[1]];
     [least(ends), most(ends)]
+}
+
+/// Order of numbers in two intervals; none if the intervals overlap.
+pub(crate) fn apart(a: [f64; 2], b: [f64; 2]) -> Option<Ordering> {
+    if a[1] < b[0] { Some(Ordering::Less) } else { (a[0] > b[1]).then_some(Ordering::Greater) }
 }
 
 /// Largest magnitude of an interval.

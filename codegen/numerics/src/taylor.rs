@@ -12,6 +12,7 @@ use core::num::NonZeroU32;
 use core::ops::{Add, Div, Mul, Neg, Sub};
 use std::cell::RefCell;
 
+use super::form::apart;
 use specgen_runtime::Real;
 use specgen_runtime::snapshot::Field;
 
@@ -271,16 +272,7 @@ impl PartialEq for Taylor {
 impl PartialOrd for Taylor {
     /// By ranges that do not overlap.
     fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        let ([low, high], [other_low, other_high]) = (self.range(), other.range());
-        if self == other {
-            Some(Ordering::Equal)
-        } else if high < other_low {
-            Some(Ordering::Less)
-        } else if low > other_high {
-            Some(Ordering::Greater)
-        } else {
-            None
-        }
+        if self == other { Some(Ordering::Equal) } else { apart(self.range(), other.range()) }
     }
 }
 

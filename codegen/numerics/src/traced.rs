@@ -15,7 +15,7 @@ use std::cell::RefCell;
 use specgen_runtime::Real;
 use specgen_runtime::snapshot::Field;
 
-use super::form::{Form, magnitude, times};
+use super::form::{Form, apart, magnitude, times};
 
 /// The computed value lies in `form`; without any rounding it would differ by at most `error`.
 ///
@@ -286,16 +286,7 @@ impl<const SINGLE: bool> PartialEq for TracedNumber<SINGLE> {
 impl<const SINGLE: bool> PartialOrd for TracedNumber<SINGLE> {
     /// By ranges that do not overlap.
     fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        let ([low, high], [other_low, other_high]) = (self.range(), other.range());
-        if self == other {
-            Some(Ordering::Equal)
-        } else if high < other_low {
-            Some(Ordering::Less)
-        } else if low > other_high {
-            Some(Ordering::Greater)
-        } else {
-            None
-        }
+        if self == other { Some(Ordering::Equal) } else { apart(self.range(), other.range()) }
     }
 }
 
