@@ -185,12 +185,14 @@ fn joints_turn(facts: &Facts, found: &mut Findings) {
     );
 }
 
+/// Largest distance of joints from the axis, m.
+fn radius(joints: &[[f64; 3]; 6]) -> f64 {
+    joints.iter().map(|joint| libm::hypot(joint[0], joint[1])).fold(0.0, |a, b| if b > a { b } else { a })
+}
+
 /// Checks that the base is wider than the platform.
 fn base_is_wider(facts: &Facts, found: &mut Findings) {
     let geometry = &facts.model.geometry;
-    let radius = |joints: &[[f64; 3]; 6]| {
-        joints.iter().map(|joint| libm::hypot(joint[0], joint[1])).fold(0.0, |a: f64, b| if b > a { b } else { a })
-    };
     let (base, platform) = (radius(&geometry.base_joints), radius(&geometry.platform_joints));
     if platform <= base {
         return;
@@ -218,9 +220,6 @@ fn base_is_wider(facts: &Facts, found: &mut Findings) {
 /// Checks the proportions of radii and height.
 fn proportions(facts: &Facts, found: &mut Findings) {
     let geometry = &facts.model.geometry;
-    let radius = |joints: &[[f64; 3]; 6]| {
-        joints.iter().map(|joint| libm::hypot(joint[0], joint[1])).fold(0.0, |a: f64, b| if b > a { b } else { a })
-    };
     let keys = if found.model.spans.contains_key("geometry.base_radius") {
         ["geometry.base_radius", "geometry.platform_radius", "geometry.height"]
     } else {
