@@ -13,10 +13,6 @@ use specgen_studies::tuning::relay::{self, Ultimate};
 use specgen_studies::tuning::space::{Role, rounded};
 use specgen_studies::tuning::{Case, Evaluation, Score, Setting};
 
-/// Factor per reduction of a start until it meets the margins, and the largest number of reductions.
-const SHRINK: f64 = 0.85;
-const SHRINKS: u32 = 40;
-
 /// Starting points.
 pub(super) struct Starts {
     /// The values from the spec or chosen by the compiler.
@@ -53,7 +49,7 @@ pub(super) fn starts(job: &Job, case: &Case, own: Setting, ui: &Ui) -> Result<St
     let mut scored = Vec::new();
     let mut limited = None;
     for start in [Some(own), ziegler_nichols].into_iter().flatten() {
-        let Some(setting) = shrunk(job, start) else { continue };
+        let Some(setting) = job.feasibility.reduce(&job.space, start) else { continue };
         match case.run(&mut worker, &setting).map_err(run_failure)? {
             Evaluation::Scored(score) => scored.push((setting, score)),
             Evaluation::Limited { time, status } => limited = Some((time, status)),
@@ -67,26 +63,6 @@ pub(super) fn starts(job: &Job, case: &Case, own: Setting, ui: &Ui) -> Result<St
     }
     let Some((best, score)) = best else { return Err(no_start(job, limited)) };
     Ok(Starts { own, ziegler_nichols, ultimate, scored, best, score })
-}
-
-/// The start with its tuned parameters reduced, within the bounds, until it meets the margins.
-fn shrunk(job: &Job, start: Setting) -> Option<Setting> {
-    let mut setting = job.space.setting(&job.space.genes(&start));
-    for _ in 0..=SHRINKS {
-        if job.feasibility.holds(&setting) {
-            return Some(setting);
-        }
-        let smaller = match setting {
-            Setting::Legs { level, drift } => Setting::Legs { level: level * SHRINK, drift: drift * SHRINK },
-            Setting::Platform { combined, position, period } => Setting::Platform {
-                combined: combined.scaled(SHRINK, SHRINK),
-                position: position.scaled(SHRINK, SHRINK),
-                period,
-            },
-        };
-        setting = job.space.setting(&job.space.genes(&smaller));
-    }
-    None
 }
 
 fn relay_test(job: &Job, ui: &Ui) -> Result<Option<[Option<Ultimate>; 6]>, Failure> {

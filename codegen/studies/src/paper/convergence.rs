@@ -19,9 +19,6 @@ use specgen_compiler::compile::Compilation;
 /// As in `specgen tune`: required margins, and highest frequency (Hz) and length (s) of the multisine.
 const REQUIRED: RequiredMargins = RequiredMargins { gain: 2.0, delay: 0.5 };
 const MULTISINE: [f64; 2] = [10.0, 2.0];
-/// Factor on the spec's own gains until they meet the margins, and the largest number of reductions.
-const SHRINK: f64 = 0.85;
-const SHRINKS: usize = 40;
 
 /// Result of the search.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -82,7 +79,7 @@ pub fn run(
         whole_ticks: true,
     };
     let case = Case::new(compiled, controller, leg, &own, &conditions).map_err(ConvergenceError::Run)?;
-    let starts: Vec<Vec<f64>> = start(&space, &feasibility, own).into_iter().collect();
+    let starts: Vec<Vec<f64>> = feasibility.reduce(&space, own).iter().map(|start| space.genes(start)).collect();
     let mut genetic = Genetic::new(Settings::PAPER, space.dimension(), &starts, seed);
     let stop = AtomicBool::new(false);
     let options = SearchOptions {
@@ -93,24 +90,4 @@ pub fn run(
     };
     let search = Search::run(&mut genetic, &space, &feasibility, &case, &options).map_err(ConvergenceError::Run)?;
     Ok(Convergence { seed, dimension: space.dimension(), best: search.best().copied(), history: search.history })
-}
-
-/// Genes of the spec's own parameters, reduced if they do not meet the margins; `None` if no reduction does.
-fn start(space: &Space, feasibility: &Feasibility, own: Setting) -> Option<Vec<f64>> {
-    let mut setting = own;
-    for _ in 0..=SHRINKS {
-        setting = space.setting(&space.genes(&setting));
-        if feasibility.holds(&setting) {
-            return Some(space.genes(&setting));
-        }
-        setting = match setting {
-            Setting::Legs { level, drift } => Setting::Legs { level: level * SHRINK, drift: drift * SHRINK },
-            Setting::Platform { combined, position, period } => Setting::Platform {
-                combined: combined.scaled(SHRINK, SHRINK),
-                position: position.scaled(SHRINK, SHRINK),
-                period,
-            },
-        };
-    }
-    None
 }

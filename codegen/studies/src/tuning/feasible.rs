@@ -9,11 +9,15 @@ use specgen_compiler::stability::{LegDynamics, ewma_limit, pcc_limit, spectral_r
 use specgen_language::model::{Adaptation, AdaptationMode};
 use specgen_runtime::ControlMode;
 
-use super::Setting;
+use super::{Setting, Space};
 
 /// Number of values of λ per candidate: the limits of the interval, which are the worst cases. The compiler checks more
 /// when the result is written.
 const ENDS: usize = 2;
+
+/// Factor per reduction of a setting until it meets the margins, and the largest number of reductions.
+const SHRINK: f64 = 0.85;
+const SHRINKS: usize = 40;
 
 /// Required stability margins.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -88,6 +92,14 @@ impl Feasibility {
             }
             _ => false,
         }
+    }
+
+    /// The tuned parameters of a setting, within their bounds and reduced until they meet the margins; `None` if no reduction does.
+    #[must_use]
+    pub fn reduce(&self, space: &Space, setting: Setting) -> Option<Setting> {
+        let bounded = |setting| space.setting(&space.genes(&setting));
+        let settings = std::iter::successors(Some(bounded(setting)), |last| Some(bounded(last.scaled(SHRINK))));
+        settings.take(1 + SHRINKS).find(|setting| self.holds(setting))
     }
 }
 

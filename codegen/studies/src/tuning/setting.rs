@@ -80,6 +80,18 @@ impl Setting {
         words
     }
 
+    /// The setting with all gains and bandwidths, or weights, times a factor.
+    pub(super) fn scaled(self, factor: f64) -> Self {
+        match self {
+            Self::Legs { level, drift } => Self::Legs { level: level * factor, drift: drift * factor },
+            Self::Platform { combined, position, period } => Self::Platform {
+                combined: combined.scaled(factor, factor),
+                position: position.scaled(factor, factor),
+                period,
+            },
+        }
+    }
+
     /// The gains in use: those of P if `alone`, else of the other modes. Legs have none.
     #[must_use]
     pub fn tuning(&self, alone: bool) -> Tuning {
