@@ -14,42 +14,27 @@ mod resonance;
 use super::least_squares::{fit, mean_square};
 use super::statistics::{Line, centred, rates};
 
-/// A source of error.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Source {
-    /// Linear in time; not part of the reported residual.
-    Drift,
-    /// Proportional to the rate of the drive.
-    DeadTime,
-    /// Response of a lightly damped mode to the drive.
-    Resonance,
-    /// Quadratic in time, independent of the drive.
-    BentDrift,
-    /// Slow response to the drive.
-    Creep,
-    /// At the mains frequency, which the drive does not contain.
-    Hum,
-    /// White noise of gauge and converter.
-    Noise,
-    /// Everything else.
-    Model,
-}
-
-impl Source {
-    /// Name of the cause in messages.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Drift => "drift",
-            Self::DeadTime => "dead time or lag",
-            Self::Resonance => "resonance",
-            Self::BentDrift => "drift that bends",
-            Self::Creep => "creep",
-            Self::Hum => "hum of the mains",
-            Self::Noise => "noise",
-            Self::Model => "model (cells of finite size, hysteresis that no Preisach model has)",
-        }
+specgen_language::named! {
+    /// A source of error.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+    #[serde(rename_all = "snake_case")]
+    pub enum Source {
+        /// Linear in time; not part of the reported residual.
+        Drift => "drift",
+        /// Proportional to the rate of the drive.
+        DeadTime => "dead time or lag",
+        /// Response of a lightly damped mode to the drive.
+        Resonance => "resonance",
+        /// Quadratic in time, independent of the drive.
+        BentDrift => "drift that bends",
+        /// Slow response to the drive.
+        Creep => "creep",
+        /// At the mains frequency, which the drive does not contain.
+        Hum => "hum of the mains",
+        /// White noise of gauge and converter.
+        Noise => "noise",
+        /// Everything else.
+        Model => "model (cells of finite size, hysteresis that no Preisach model has)",
     }
 }
 

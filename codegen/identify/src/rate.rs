@@ -38,40 +38,23 @@ use super::{Options, coverage, defects, selection, sweep};
 pub use export::{read_rate_csv, spec_lines, write_rate_csv};
 pub use report::{HoldOut, OptionReport, RateRecord, RateReport, Verdict};
 
-/// An option for the rate dependence.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum RateOption {
-    /// One Everett table, at any rate.
-    Static,
-    /// One table with a dead time.
-    DeadTime,
-    /// A second table times the rate of the drive (6).
-    DynamicPreisach,
-    /// Table, creep and dead time.
-    Creep,
-    /// The same with one weight for all its time constants.
-    EvenCreep,
-    /// Table, creep, dead time and a mode after them, if a record rings or the mode is given.
-    CreepMode,
-}
-
-impl RateOption {
-    /// Every option, the simplest first.
-    pub const ALL: [Self; 6] =
-        [Self::Static, Self::DeadTime, Self::DynamicPreisach, Self::Creep, Self::EvenCreep, Self::CreepMode];
-
-    /// Its name in a report.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Static => "static",
-            Self::DeadTime => "static, dead time",
-            Self::DynamicPreisach => "dynamic Preisach",
-            Self::Creep => "creep, dead time",
-            Self::EvenCreep => "creep, one weight",
-            Self::CreepMode => "creep and mode",
-        }
+specgen_language::named! {
+    /// An option for the rate dependence.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Serialize)]
+    #[serde(rename_all = "kebab-case")]
+    pub enum RateOption {
+        /// One Everett table, at any rate.
+        Static => "static",
+        /// One table with a dead time.
+        DeadTime => "static, dead time",
+        /// A second table times the rate of the drive (6).
+        DynamicPreisach => "dynamic Preisach",
+        /// Table, creep and dead time.
+        Creep => "creep, dead time",
+        /// The same with one weight for all its time constants.
+        EvenCreep => "creep, one weight",
+        /// Table, creep, dead time and a mode after them, if a record rings or the mode is given.
+        CreepMode => "creep and mode",
     }
 }
 

@@ -18,6 +18,7 @@ mod keys;
 mod lines;
 pub mod lock;
 pub mod model;
+mod named;
 pub mod outcome;
 pub mod output;
 pub mod quantity;

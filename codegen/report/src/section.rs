@@ -190,7 +190,7 @@ impl Section {
                 cell(&row.paper),
                 cell(&row.ours),
                 row.ratio.map_or_else(String::new, digits),
-                row.remark.map_or_else(String::new, |remark| remark.id().to_owned()),
+                row.remark.map_or_else(String::new, |remark| remark.name().to_owned()),
             ]);
         }
         self.parts.push(Part::Table(grid));
@@ -198,7 +198,7 @@ impl Section {
         remarks.sort_unstable();
         remarks.dedup();
         for remark in remarks {
-            self.parts.push(Part::Text(format!("{}: {}", remark.id(), remark.text())));
+            self.parts.push(Part::Text(format!("{}: {}", remark.name(), remark.text())));
         }
         self
     }

@@ -6,69 +6,38 @@ use serde::{Deserialize, Serialize};
 
 use specgen_language::model::Model;
 
-/// A parameter of a machine that may deviate from its spec.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Factor {
-    /// Mass and inertia of the platform; for legs with their own gauges the moving mass, through the resonance.
-    Mass,
-    /// Axial stiffness of a leg.
-    Stiffness,
-    /// Damping ratio.
-    Damping,
-    /// λ, the gain of a leg.
-    Gain,
-    /// Thresholds of a leg's play operators: the width of its loop.
-    Hysteresis,
-    /// Creep of a leg.
-    Creep,
-    /// Lag of an amplifier.
-    Lag,
-    /// Lag of the gauges.
-    GaugeLag,
-    /// Noise of gauges, amplifiers and force sensor.
-    Noise,
-    /// Delay of the voltages in control intervals: an integer, not a factor.
-    DelayTicks,
-    /// Kinds of structural modes that a platform may have ([`crate::machine::StructureRange`]), by number: none, or from 1 to the
-    /// last of the spec; an option is 0 or 1. A random platform also has the rest of what real structures have.
-    Structure,
+specgen_language::named! {
+    /// A parameter of a machine that may deviate from its spec.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+    #[serde(rename_all = "snake_case")]
+    pub enum Factor {
+        /// Mass and inertia of the platform; for legs with their own gauges the moving mass, through the resonance.
+        Mass => "mass",
+        /// Axial stiffness of a leg.
+        Stiffness => "stiffness",
+        /// Damping ratio.
+        Damping => "damping",
+        /// λ, the gain of a leg.
+        Gain => "gain",
+        /// Thresholds of a leg's play operators: the width of its loop.
+        Hysteresis => "hysteresis",
+        /// Creep of a leg.
+        Creep => "creep",
+        /// Lag of an amplifier.
+        Lag => "lag",
+        /// Lag of the gauges.
+        GaugeLag => "gauge_lag",
+        /// Noise of gauges, amplifiers and force sensor.
+        Noise => "noise",
+        /// Delay of the voltages in control intervals: an integer, not a factor.
+        DelayTicks => "delay_ticks",
+        /// Kinds of structural modes that a platform may have ([`crate::machine::StructureRange`]), by number: none, or from 1 to the
+        /// last of the spec; an option is 0 or 1. A random platform also has the rest of what real structures have.
+        Structure => "structure",
+    }
 }
 
 impl Factor {
-    /// All parameters, in the order of reports.
-    pub const ALL: [Self; 11] = [
-        Self::Mass,
-        Self::Stiffness,
-        Self::Damping,
-        Self::Gain,
-        Self::Hysteresis,
-        Self::Creep,
-        Self::Lag,
-        Self::GaugeLag,
-        Self::Noise,
-        Self::DelayTicks,
-        Self::Structure,
-    ];
-
-    /// Its name in options, corners and `[robust]`.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Mass => "mass",
-            Self::Stiffness => "stiffness",
-            Self::Damping => "damping",
-            Self::Gain => "gain",
-            Self::Hysteresis => "hysteresis",
-            Self::Creep => "creep",
-            Self::Lag => "lag",
-            Self::GaugeLag => "gauge_lag",
-            Self::Noise => "noise",
-            Self::DelayTicks => "delay_ticks",
-            Self::Structure => "structure",
-        }
-    }
-
     /// Whether each leg has its own value in a random machine.
     #[must_use]
     pub fn of_each_leg(self) -> bool {

@@ -5,29 +5,31 @@ use serde::{Serialize, Serializer};
 /// A ratio within this of 1 needs no explanation.
 pub const AGREES: f64 = 0.10;
 
-/// A reason.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Remark {
-    /// Within [`AGREES`].
-    Agrees,
-    /// Bias of Table 1.
-    Bias,
-    /// EWMA and PCC of Table 2.
-    UpperBound,
-    /// Tables 5 and 7.
-    Tracking,
-    /// Tables 6 and 8.
-    Angles,
-    /// Table 5, z, PCC, 0.1 Hz.
-    Suspect,
-    /// Table 9, translation.
-    WorkParts,
-    /// Table 9, angles.
-    BelowResolution,
-    /// (AII.18).
-    Ewma,
-    /// No known reason.
-    Unexplained,
+specgen_language::named! {
+    /// A reason.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+    pub enum Remark {
+        /// Within [`AGREES`].
+        Agrees => "agrees",
+        /// Bias of Table 1.
+        Bias => "bias",
+        /// EWMA and PCC of Table 2.
+        UpperBound => "upper-bound",
+        /// Tables 5 and 7.
+        Tracking => "tracking",
+        /// Tables 6 and 8.
+        Angles => "angles",
+        /// Table 5, z, PCC, 0.1 Hz.
+        Suspect => "suspect",
+        /// Table 9, translation.
+        WorkParts => "work-parts",
+        /// Table 9, angles.
+        BelowResolution => "below-resolution",
+        /// (AII.18).
+        Ewma => "ewma-limit",
+        /// No known reason.
+        Unexplained => "unexplained",
+    }
 }
 
 impl Remark {
@@ -35,23 +37,6 @@ impl Remark {
     #[must_use]
     pub fn of(paper: f64, ours: f64, reason: Self) -> Self {
         if (ours / paper - 1.0).abs() <= AGREES { Self::Agrees } else { reason }
-    }
-
-    /// Short name for tables.
-    #[must_use]
-    pub fn id(self) -> &'static str {
-        match self {
-            Self::Agrees => "agrees",
-            Self::Bias => "bias",
-            Self::UpperBound => "upper-bound",
-            Self::Tracking => "tracking",
-            Self::Angles => "angles",
-            Self::Suspect => "suspect",
-            Self::WorkParts => "work-parts",
-            Self::BelowResolution => "below-resolution",
-            Self::Ewma => "ewma-limit",
-            Self::Unexplained => "unexplained",
-        }
     }
 
     /// The reason as text.
@@ -103,7 +88,7 @@ impl Remark {
 
 impl Serialize for Remark {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.serialize_str(self.id())
+        serializer.serialize_str(self.name())
     }
 }
 

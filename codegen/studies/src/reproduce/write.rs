@@ -117,12 +117,12 @@ impl Results {
                     cell(&row.paper).replace('|', "\\|"),
                     cell(&row.ours).replace('|', "\\|"),
                     row.ratio.map_or_else(String::new, digits),
-                    row.remark.map_or("", |remark| remark.id())
+                    row.remark.map_or("", |remark| remark.name())
                 );
             }
             out.push('\n');
             for remark in table.remarks() {
-                let _ = writeln!(out, "- **{}**: {}", remark.id(), remark.text());
+                let _ = writeln!(out, "- **{}**: {}", remark.name(), remark.text());
             }
             if table.id == "table-3" {
                 let _ =
@@ -157,7 +157,7 @@ impl Results {
                     plain(&row.paper),
                     plain(&row.ours),
                     row.ratio.map_or_else(String::new, |ratio| format!("{ratio:.6}")),
-                    row.remark.map_or("", |remark| remark.id()),
+                    row.remark.map_or("", |remark| remark.name()),
                     row.coverage.map_or_else(
                         || ",".to_owned(),
                         |coverage| format!("{:.6},{:.6}", coverage.seconds, coverage.path_seconds)
@@ -174,7 +174,7 @@ impl Serialize for Results {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let mut remarks = serde_json::Map::new();
         for remark in self.tables.iter().flat_map(Table::remarks) {
-            remarks.insert(remark.id().to_owned(), remark.text().into());
+            remarks.insert(remark.name().to_owned(), remark.text().into());
         }
         json!({
             "specgen": env!("CARGO_PKG_VERSION"),

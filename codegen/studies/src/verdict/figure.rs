@@ -4,47 +4,28 @@ use host_sim::coverage::Coverage;
 use serde::Serialize;
 use specgen_toolchain::budget::group;
 
-/// Subject of a figure: a line of the text, a row of a card.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Subject {
-    /// Reach of each axis alone, from the middle of the strokes, µm and µrad; the limit is the declared workspace.
-    Reach,
-    /// Noise of the measured pose at rest, and of a reading, rms; `step`: the largest converter step, at a leg or the platform.
-    Noise,
-    /// Fit of the hysteresis tables to their records.
-    Record,
-    /// Stability margins of the worst control mode.
-    Margins,
-    /// Errors along trajectories of the spec. [`Verdict::of`](super::Verdict::of) has none, but reports limits: they need
-    /// a run.
-    Tracking,
-    /// Instructions of a tick.
-    Time,
-    /// Flash, RAM and stack; violations in the image.
-    Memory,
-    /// Whether host and microcontroller compute the same bits.
-    Bits,
-}
-
-impl Subject {
-    /// In the order of the text.
-    pub const ALL: [Self; 8] =
-        [Self::Reach, Self::Noise, Self::Record, Self::Margins, Self::Tracking, Self::Time, Self::Memory, Self::Bits];
-
-    /// In one word.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Reach => "reach",
-            Self::Noise => "noise",
-            Self::Record => "record",
-            Self::Margins => "margins",
-            Self::Tracking => "tracking",
-            Self::Time => "time",
-            Self::Memory => "memory",
-            Self::Bits => "bits",
-        }
+specgen_language::named! {
+    /// Subject of a figure: a line of the text, a row of a card.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+    #[serde(rename_all = "kebab-case")]
+    pub enum Subject {
+        /// Reach of each axis alone, from the middle of the strokes, µm and µrad; the limit is the declared workspace.
+        Reach => "reach",
+        /// Noise of the measured pose at rest, and of a reading, rms; `step`: the largest converter step, at a leg or the platform.
+        Noise => "noise",
+        /// Fit of the hysteresis tables to their records.
+        Record => "record",
+        /// Stability margins of the worst control mode.
+        Margins => "margins",
+        /// Errors along trajectories of the spec. [`Verdict::of`](super::Verdict::of) has none, but reports limits: they need
+        /// a run.
+        Tracking => "tracking",
+        /// Instructions of a tick.
+        Time => "time",
+        /// Flash, RAM and stack; violations in the image.
+        Memory => "memory",
+        /// Whether host and microcontroller compute the same bits.
+        Bits => "bits",
     }
 }
 
