@@ -72,18 +72,18 @@ impl MachineSource for OnLine<'_> {
             _ => Ok(format!("the machine is {}, amplifiers off", operator.state())),
         };
         // Keep the result, even if the machine faulted.
-        let found = match done {
+        let result = match done {
             Ok(done) => Some(keep(done, ui)?),
             Err(LearnError::Interruption) => None,
             Err(error) => return Err(down.err().unwrap_or_else(|| failure(&error, format!("{name}: {error}")))),
         };
-        let down = format!("; {}", down?);
-        let why = match ending {
+        let final_state = format!("; {}", down?);
+        let reason = match ending {
             Some(SessionError::Refused(text) | SessionError::Fault(text)) => Some(format!("{name}: {text}")),
             Some(SessionError::Failed(failure)) => return Err(failure),
             Some(SessionError::Stopped) => Some(format!("{name}: the program that serves the link has ended")),
             Some(SessionError::Link(_) | SessionError::Interrupted) | None => None,
         };
-        Ok(SessionResult { found, why, down })
+        Ok(SessionResult { result, reason, final_state })
     }
 }

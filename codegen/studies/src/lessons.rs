@@ -36,8 +36,8 @@ const UNKNOWN: &str =
     "the measured response is too uncertain for learning; measure it along a longer motion with --excite";
 /// Time limit for reaching the bias pose, s.
 const ARMING: f64 = 60.0;
-/// An error below this share of the one that was reached is worth measuring the response.
-const WORTH: f64 = 0.8;
+/// Measuring the response is recommended if the expected error is below this share of the error that was reached.
+const WORTH_MEASURING: f64 = 0.8;
 
 /// Options of `learn`.
 #[derive(Debug)]
@@ -96,7 +96,7 @@ struct Study {
     rule: Rule,
     motion_name: String,
     machine_name: String,
-    begin: Vec<Knot>,
+    initial: Vec<Knot>,
     spacing: u32,
 }
 
@@ -112,41 +112,46 @@ pub fn simulated(options: &Options, compiled: Compilation, ui: &mut Ui) -> Resul
 ///
 /// # Errors
 /// As [`simulated`], or the machine stops early.
-pub fn run(options: &Options, compiled: Compilation, bed: &mut impl MachineSource, ui: &mut Ui) -> Result<(), Failure> {
+pub fn run(
+    options: &Options,
+    compiled: Compilation,
+    source: &mut impl MachineSource,
+    ui: &mut Ui,
+) -> Result<(), Failure> {
     if let Some(path) = &options.excite {
-        return excite::run(options, path, &compiled, bed, ui);
+        return excite::run(options, path, &compiled, source, ui);
     }
-    let study = study(options, bed, compiled)?;
-    let start = bed.start().unwrap_or(study.motion.targets[0].pose);
-    let SessionResult { found, why, down } = bed.work(
+    let study = study(options, source, compiled)?;
+    let start = source.start().unwrap_or(study.motion.targets[0].pose);
+    let SessionResult { result, reason, final_state } = source.work(
         &study.compiled,
         ui,
         |machine, ui| passes(options, &study, machine, ui),
         |learned, ui| keep(options, &study, learned, start, ui),
     )?;
-    match (found, why) {
-        (Some(found), Some(why)) => ui.judged(&found, Some(why)),
-        (None, Some(why)) => Err(Failure::Gate(why)),
-        (Some(found), None) if !matches!(found.learned.ending, Ending::Interruption | Ending::Machine) => {
-            ui.result(&found);
+    match (result, reason) {
+        (Some(lesson), Some(reason)) => ui.judged(&lesson, Some(reason)),
+        (None, Some(reason)) => Err(Failure::Gate(reason)),
+        (Some(lesson), None) if !matches!(lesson.learned.ending, Ending::Interruption | Ending::Machine) => {
+            ui.result(&lesson);
             Ok(())
         }
-        (Some(found), None) => {
-            let message = format!("interrupted; the best correction so far is kept{down}");
-            Err(Failure::Interrupted { message, result: ui.shown(&found) })
+        (Some(lesson), None) => {
+            let message = format!("interrupted; the best correction so far is kept{final_state}");
+            Err(Failure::Interrupted { message, result: ui.shown(&lesson) })
         }
-        (None, None) => Err(Failure::Gate(format!("interrupted during the first pass{down}"))),
+        (None, None) => Err(Failure::Gate(format!("interrupted during the first pass{final_state}"))),
     }
 }
 
 /// Result of a session on a machine.
 pub struct SessionResult<F> {
     /// The result of the work, if the machine completed its passes.
-    pub found: Option<F>,
+    pub result: Option<F>,
     /// Why the session ended early, if it did.
-    pub why: Option<String>,
+    pub reason: Option<String>,
     /// The final state of a machine on a link, after "; ".
-    pub down: String,
+    pub final_state: String,
 }
 
 /// A machine for passes: simulated, or on a link.
@@ -194,21 +199,25 @@ impl MachineSource for SimulatedMachine<'_> {
         let mut rig = self.0.platform(model, task)?.1.rig().clone();
         let mut bench = Bench::new(&mut rig, &mut controller, model.timing.period, 0).map_err(run_failure)?;
         bench.arm(ARMING).map_err(gate)?;
-        let found = match work(&mut bench, ui) {
+        let result = match work(&mut bench, ui) {
             Ok(done) => Some(keep(done, ui)?),
             Err(LearnError::Interruption) => None,
             Err(error) => return Err(gate(error)),
         };
-        Ok(SessionResult { found, why: None, down: String::new() })
+        Ok(SessionResult { result, reason: None, final_state: String::new() })
     }
 }
 
 /// The motion and its name.
-fn motion_of(options: &Options, bed: &impl MachineSource, compiled: &Compilation) -> Result<(Motion, String), Failure> {
+fn motion_of(
+    options: &Options,
+    source: &impl MachineSource,
+    compiled: &Compilation,
+) -> Result<(Motion, String), Failure> {
     let model = &compiled.model;
     let task = takes_correction(compiled)?;
     let followed = trajectory::chosen(options.trajectory.as_deref(), options.frequency, options.plant.seed, compiled)?;
-    let name = bed.motion_name(&followed);
+    let name = source.motion_name(&followed);
     let trajectory = followed.choice.of_platform(model, task);
     let speed = task.setpoint.speed;
     let motion =
@@ -228,8 +237,8 @@ fn learnable_of(compiled: &Compilation) -> Result<Learnable, Failure> {
         .ok_or_else(|| Failure::Environment("the platform has no modes, although the spec was checked".to_owned()))
 }
 
-fn study(options: &Options, bed: &impl MachineSource, compiled: Compilation) -> Result<Study, Failure> {
-    let (motion, motion_name) = motion_of(options, bed, &compiled)?;
+fn study(options: &Options, source: &impl MachineSource, compiled: Compilation) -> Result<Study, Failure> {
+    let (motion, motion_name) = motion_of(options, source, &compiled)?;
     let machine_name = machine_name(options);
     let mut learnable = learnable_of(&compiled)?;
     let mut refused = format!("{NOWHERE}, or measure the machine's response with --excite");
@@ -252,10 +261,11 @@ fn study(options: &Options, bed: &impl MachineSource, compiled: Compilation) -> 
     });
     let plan = plan.transpose()?;
     let convergence = plan.as_ref().map_or(convergence, |plan| plan.convergence.clone());
-    let (begin, spacing) = begin(options, &compiled, &learnable, &motion, &convergence, [&machine_name, &motion_name])?;
+    let (initial, spacing) =
+        initial_correction(options, &compiled, &learnable, &motion, &convergence, [&machine_name, &motion_name])?;
     let rule = plan
         .map_or_else(|| Rule::Host(Box::new(Update::new(&learnable, &motion, &convergence, spacing))), Rule::Device);
-    Ok(Study { compiled, convergence, motion, rule, motion_name, machine_name, begin, spacing })
+    Ok(Study { compiled, convergence, motion, rule, motion_name, machine_name, initial, spacing })
 }
 
 /// Runs the passes, reporting each; the user may stop them.
@@ -265,14 +275,14 @@ fn passes(
     machine: &mut dyn RepeatableMachine,
     ui: &Ui,
 ) -> Result<LearningResult, LearnError> {
-    let Study { motion, rule, begin, spacing, .. } = study;
+    let Study { motion, rule, initial, spacing, .. } = study;
     let learner = match rule {
         Rule::Host(update) => Learner::Host(update),
         Rule::Device(plan) => Learner::Device(plan),
     };
     let stop = interrupt::heed();
     let count = options.passes as usize;
-    let learned = learn(machine, motion, learner, begin, *spacing, count, |number, pass| {
+    let learned = learn(machine, motion, learner, initial, *spacing, count, |number, pass| {
         ui.rate(&format!("learn: pass {number} of {count}, {:.1} nm", pass.translation_nm));
         if stop.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     });
@@ -327,7 +337,7 @@ fn help(options: &Options, study: &Study, learned: &LearningResult) -> Vec<Strin
     }
     let left = learned.passes[learned.best].measured_nm;
     let stopped = matches!(learned.ending, Ending::Growth | Ending::NoGain);
-    let expected = learned.expected_nm.filter(|expected| *expected < WORTH * left);
+    let expected = learned.expected_nm.filter(|expected| *expected < WORTH_MEASURING * left);
     let reach = convergence.reach();
     if let Some(expected) = expected.filter(|_| !convergence.measured && (stopped || highest < reach)) {
         let wider = if reach > options.bandwidth { format!(" --bandwidth {reach}") } else { String::new() };
@@ -355,7 +365,7 @@ pub fn failure(error: &LearnError, message: String) -> Failure {
 }
 
 /// The initial correction, and the ticks between knots.
-fn begin(
+fn initial_correction(
     options: &Options,
     compiled: &Compilation,
     learnable: &Learnable,

@@ -19,7 +19,7 @@ use specgen_numerics::complex6::{Matrix6c, inverse, larger, left, multiply, norm
 pub const LARGEST_RADIUS: f64 = 0.9;
 /// Order of Q at its upper and at its lower end.
 const ORDERS: [f64; 2] = [8.0, 4.0];
-/// A correction is not learned where the loop passes less of it than this: there the feedback suffices.
+/// Smallest share of a correction that the loop must pass in every mode. Below it nothing is learned: there the feedback suffices.
 const LEAST_LEFT: f64 = 0.004;
 /// Frequency that counts as rest, relative to the lowest one tried.
 const REST: f64 = 1e-3;
@@ -27,11 +27,13 @@ const REST: f64 = 1e-3;
 const SHARES: [f64; 11] = [1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.2, 0.1, 0.0];
 /// Share of the inverse of a measured T: legs with hysteresis answer a sweep and a correction of another size differently.
 const MEASURED_SHARE: f64 = 0.7;
-/// Ratio of the natural frequencies of unknown structural modes that are tried one after the other, and up to which multiple of a frequency.
+/// Ratio of one natural frequency to the next, of the unknown structural modes that are tried.
 const FREQUENCY_STEP: f64 = 1.005;
+/// Highest natural frequency that is tried, relative to the frequency of the correction.
 const HIGHEST_MODE: f64 = 2.0;
-/// Bandwidth to learn such modes with a measured T, relative to f0, and what it is a multiple of, Hz.
+/// Bandwidth that includes the lowest unknown structural mode, relative to its frequency.
 const REACH: f64 = 1.5;
+/// The bandwidth is rounded up to a multiple of this, Hz.
 const REACH_STEP: f64 = 50.0;
 /// Knots per period of f_c.
 const KNOTS: f64 = 3.5;
@@ -63,7 +65,7 @@ pub struct Learnable {
 /// Result of the convergence analysis for every machine within the intervals.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Convergence {
-    /// Below the first frequency the error is left to the feedback; the second is f_c. Hz.
+    /// Lower end, below which the error is left to the feedback, and f_c, the upper end; Hz.
     pub band: [f64; 2],
     /// Largest bound of ρ(Q (I − T L)) over frequencies and machines.
     pub radius: f64,
@@ -73,7 +75,7 @@ pub struct Convergence {
     pub measured: bool,
     /// Highest frequency requested, Hz.
     #[serde(skip)]
-    pub(super) wish: f64,
+    pub(super) requested: f64,
     /// Lowest frequency of the measured T, Hz; infinite if none was measured.
     #[serde(skip)]
     pub(super) edge: f64,
@@ -99,11 +101,11 @@ impl Convergence {
     }
 
     /// The band around the best-measured frequency in which learning with T⁻¹ converges for any T within three standard errors of the
-    /// measurement, up to `wish` (Hz); `None` if there is none.
-    fn measured(response: &Response, wish: f64) -> Option<Self> {
+    /// measurement, up to `requested` (Hz); `None` if there is none.
+    fn measured(response: &Response, requested: f64) -> Option<Self> {
         let bins = &response.bins;
         let radii: Vec<f64> = bins.iter().map(|bin| 1.0 - MEASURED_SHARE + MEASURED_SHARE * bin.doubt()).collect();
-        let inside = |k: &usize| bins[*k].hertz <= wish;
+        let inside = |k: &usize| bins[*k].hertz <= requested;
         let best = (0..radii.len()).filter(inside).min_by(|a, b| radii[*a].total_cmp(&radii[*b]))?;
         // NaN counts as not converging.
         let known = |k: &usize| radii[*k] <= LARGEST_RADIUS;
@@ -119,7 +121,7 @@ impl Convergence {
         let above: Vec<[f64; 2]> = (first..radii.len()).map(|k| [bins[k].hertz, radius(k)]).collect();
         // Nothing is known beyond the last bin.
         let end = [bins.last()?.hertz, 1.0];
-        let high = highest_passed(above.into_iter().chain([end]), wish)?;
+        let high = highest_passed(above.into_iter().chain([end]), requested)?;
         if low >= high {
             return None;
         }
@@ -132,7 +134,7 @@ impl Convergence {
             radius: 0.0,
             at: 0.0,
             measured: true,
-            wish,
+            requested,
             edge: low,
             delay: 0.0,
             unknown_from: 0.0,
@@ -140,13 +142,13 @@ impl Convergence {
             shares,
         };
         for (k, bin) in bins.iter().enumerate() {
-            found.meet(bin.hertz, radius(k));
+            found.add_bound(bin.hertz, radius(k));
         }
         Some(found)
     }
 
-    /// Adds the factor by which the error is multiplied at a frequency (Hz), without Q.
-    fn meet(&mut self, hertz: f64, radius: f64) {
+    /// Adds a bound: `radius` is the factor per pass on the error at a frequency (Hz), without Q.
+    fn add_bound(&mut self, hertz: f64, radius: f64) {
         self.bounds.push([hertz, radius]);
         let radius = radius * self.passed(hertz);
         if radius > self.radius {
@@ -165,11 +167,11 @@ impl Convergence {
     #[must_use]
     pub fn reach(&self) -> f64 {
         let beyond = REACH_STEP * libm::ceil(REACH * self.unknown_from / REACH_STEP);
-        if beyond > self.wish { beyond } else { self.wish }
+        if beyond > self.requested { beyond } else { self.requested }
     }
 
     /// |Q| at a frequency (Hz) if learning reached [`Self::reach`].
-    pub(super) fn wished(&self, hertz: f64) -> f64 {
+    pub(super) fn passed_at_reach(&self, hertz: f64) -> f64 {
         passed([self.band[0], self.reach()], hertz)
     }
 
@@ -262,16 +264,17 @@ impl Learnable {
         self.expected(frequencies, 0.0)
     }
 
-    /// The highest f_c up to `wish` (Hz) at which learning converges on every machine within `factors`, or for a measured T within its
+    /// The highest f_c up to `requested` (Hz) at which learning converges on every machine within `factors`, or for a measured T within its
     /// uncertainty; `None` if it converges at no frequency.
     #[must_use]
-    pub fn convergence(&self, factors: &Factors, wish: f64) -> Option<Convergence> {
+    pub fn convergence(&self, factors: &Factors, requested: f64) -> Option<Convergence> {
         if let Some(response) = &self.measured {
-            return Some(self.slower(Convergence::measured(response, wish)?, factors, wish));
+            return Some(self.extended_downwards(Convergence::measured(response, requested)?, factors, requested));
         }
-        let frequencies = self.grid(wish);
+        let frequencies = self.grid(requested);
         let (inverses, shares, radii) = self.modelled(&frequencies, factors);
-        let highest = highest_passed(frequencies.iter().zip(&radii).map(|(hertz, radius)| [*hertz, *radius]), wish)?;
+        let highest =
+            highest_passed(frequencies.iter().zip(&radii).map(|(hertz, radius)| [*hertz, *radius]), requested)?;
         let lowest = *frequencies.first()?;
         let answers = frequencies.iter().zip(&inverses).find(|(_, inverse)| responds(inverse));
         let low = answers.map_or(0.0, |(hertz, _)| self.lower_end(*hertz, lowest));
@@ -284,7 +287,7 @@ impl Learnable {
             radius: 0.0,
             at: 0.0,
             measured: false,
-            wish,
+            requested,
             edge: f64::INFINITY,
             delay: middle_delay(factors),
             unknown_from: self.unknown.from,
@@ -292,18 +295,18 @@ impl Learnable {
             shares,
         };
         for (hertz, radius) in frequencies.iter().zip(&radii) {
-            found.meet(*hertz, *radius);
+            found.add_bound(*hertz, *radius);
         }
         Some(found)
     }
 
-    /// Extends a measured band downwards with the model's T and the machines within `factors`: a sweep during a pass tells little about
-    /// slow motion, most of which the feedback suppresses, and there mass and stiffness hardly matter.
-    fn slower(&self, mut found: Convergence, factors: &Factors, wish: f64) -> Convergence {
-        let frequencies: Vec<f64> = self.grid(wish).into_iter().filter(|hertz| *hertz < found.edge).collect();
+    /// Extends a measured band downwards with the model's T and the machines within `factors`. A sweep during a pass says little about slow
+    /// motion: the feedback suppresses most of it. The model is reliable there, because mass and stiffness hardly matter.
+    fn extended_downwards(&self, mut found: Convergence, factors: &Factors, requested: f64) -> Convergence {
+        let frequencies: Vec<f64> = self.grid(requested).into_iter().filter(|hertz| *hertz < found.edge).collect();
         let (inverses, shares, radii) = self.modelled(&frequencies, factors);
         let learned = |k: &usize| radii[*k] <= LARGEST_RADIUS && responds(&inverses[*k]);
-        // The band that ends where the measured one begins.
+        // Lowest frequency of the band that ends where the measured one begins.
         let first = (0..frequencies.len()).rev().take_while(learned).last();
         let Some(first) = first else { return found };
         let slow = frequencies[first..].iter().zip(&shares[first..]).map(|(hertz, share)| [*hertz, *share]);
@@ -314,17 +317,17 @@ impl Learnable {
         let bounds = std::mem::take(&mut found.bounds);
         let mut whole = Convergence { band, radius: 0.0, at: 0.0, bounds: Vec::new(), shares, delay, ..found };
         for (hertz, radius) in frequencies.iter().zip(&radii) {
-            whole.meet(*hertz, *radius);
+            whole.add_bound(*hertz, *radius);
         }
         for [hertz, radius] in bounds.into_iter().filter(|[hertz, _]| *hertz >= edge) {
-            whole.meet(hertz, radius);
+            whole.add_bound(hertz, radius);
         }
         whole
     }
 
-    /// Lower end (Hz) of a band whose lowest frequency is `first`, if frequencies down to `lowest` were tried: 0 if every mode responds at rest.
-    /// With an integral, none does: T⁻¹ would turn the smallest constant error into a large constant correction, the fades at both ends of a
-    /// pass would cut it off, and the next pass would learn from what the cuts leave.
+    /// Lower end (Hz) of a band whose lowest frequency is `first`, where `lowest` is the lowest one tried: 0 if every mode responds at rest,
+    /// else `first`. With integral action no mode responds at rest: T⁻¹ would turn the smallest constant error into a large constant
+    /// correction, the fades at both ends of a pass would cut it off, and the next pass would learn from the remainder.
     fn lower_end(&self, first: f64, lowest: f64) -> f64 {
         let respond_at_rest = || self.nominal(&[REST * lowest]).iter().all(|response| responds(&inverse(response)));
         if first <= lowest && respond_at_rest() { 0.0 } else { first }
@@ -393,8 +396,8 @@ impl Learnable {
     }
 
     /// Frequencies up to where Q passes nothing, in ascending order, densest around the modes.
-    pub(super) fn grid(&self, wish: f64) -> Vec<f64> {
-        let highest = highest(wish, self.closed_loop.period);
+    pub(super) fn grid(&self, requested: f64) -> Vec<f64> {
+        let highest = highest(requested, self.closed_loop.period);
         let share = |k: u32| f64::from(k) / f64::from(GRID - 1);
         let mut all: Vec<f64> = (0..GRID).map(|k| highest * libm::pow(1e-3, 1.0 - share(k))).collect();
         for mode in self.closed_loop.basis.frequencies {
@@ -448,9 +451,9 @@ fn delayed(delay: f64) -> Conditions {
     Conditions { delay, ..Conditions::NOMINAL }
 }
 
-/// The highest f_c up to `wish` (Hz) whose Q keeps the radius at each frequency (Hz) below the largest permitted; `None` if a radius is NaN.
-fn highest_passed(radii: impl Iterator<Item = [f64; 2]>, wish: f64) -> Option<f64> {
-    let mut highest = wish;
+/// The highest f_c up to `requested` (Hz) whose Q keeps the radius at each frequency (Hz) below the largest permitted; `None` if a radius is NaN.
+fn highest_passed(radii: impl Iterator<Item = [f64; 2]>, requested: f64) -> Option<f64> {
+    let mut highest = requested;
     for [hertz, radius] in radii {
         let excess = radius / LARGEST_RADIUS - 1.0;
         if excess.is_nan() {

@@ -72,8 +72,8 @@ impl Excitation {
         let period = learnable.closed_loop.period;
         let spacing = spacing(bandwidth, period);
         let time = motion.scored.end as f64 * period;
-        let [wish, fastest] = [BEYOND * bandwidth, RATE / (f64::from(spacing) * period)];
-        let band = [1.0 / time, if wish < fastest { wish } else { fastest }];
+        let [requested, fastest] = [BEYOND * bandwidth, RATE / (f64::from(spacing) * period)];
+        let band = [1.0 / time, if requested < fastest { requested } else { fastest }];
         // Its rate is largest at its end, or at FAST; its size at the beginning.
         let steepest = if band[1] < FAST { band[1] } else { FAST };
         let rate = limit / (TAU * (steepest + SLOW[0]) * ONSET);

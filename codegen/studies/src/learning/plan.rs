@@ -69,14 +69,14 @@ impl Plan {
         let period = learnable.closed_loop.period;
         let mut machines = learnable.machines(factors);
         machines.extend(learnable.with_a_mode(factors));
-        let mut wish = convergence.clone();
-        while wish.band[1] >= LEAST {
-            let spacing = wish.spacing(period);
+        let mut trial = convergence.clone();
+        while trial.band[1] >= LEAST {
+            let spacing = trial.spacing(period);
             let knots = motion.corrected.div_ceil(spacing as usize);
             if let Some(reach) = reach(knots, capacity) {
                 let grid = Grid { period, spacing, reach };
-                let taps = grid.taps(learnable, &wish);
-                let frequencies = looked_at(learnable, &wish, grid.apart());
+                let taps = grid.taps(learnable, &trial);
+                let frequencies = proof_frequencies(learnable, &trial, grid.apart());
                 let [mut radius, mut at] = [0.0_f64; 2];
                 for (closed_loop, conditions) in &machines {
                     let real = learnable.response(closed_loop, conditions, &frequencies);
@@ -87,11 +87,11 @@ impl Plan {
                     }
                 }
                 if radius <= LARGEST_RADIUS {
-                    let convergence = Convergence { radius, at, ..wish };
+                    let convergence = Convergence { radius, at, ..trial };
                     return Some(grid.plan(&taps, learnable, convergence));
                 }
             }
-            wish.band[1] *= LOWER;
+            trial.band[1] *= LOWER;
         }
         None
     }
@@ -121,9 +121,9 @@ fn reach(knots: usize, capacity: usize) -> Option<usize> {
 }
 
 /// Frequencies of the proof, Hz: up to half the knot rate, above which only aliases are seen and played.
-fn looked_at(learnable: &Learnable, wish: &Convergence, apart: f64) -> Vec<f64> {
+fn proof_frequencies(learnable: &Learnable, trial: &Convergence, apart: f64) -> Vec<f64> {
     let highest = 0.5 / apart;
-    let mut all: Vec<f64> = learnable.grid(wish.band[1]).into_iter().filter(|hertz| *hertz < highest).collect();
+    let mut all: Vec<f64> = learnable.grid(trial.band[1]).into_iter().filter(|hertz| *hertz < highest).collect();
     all.extend((1..=EVEN).map(|k| highest * f64::from(k) / f64::from(EVEN)));
     all
 }
@@ -146,13 +146,13 @@ impl Grid {
         [mean * spline * libm::cos(turn), mean * spline * libm::sin(turn)]
     }
 
-    fn taps(&self, learnable: &Learnable, wish: &Convergence) -> Taps {
+    fn taps(&self, learnable: &Learnable, trial: &Convergence) -> Taps {
         let length = (2 * FINE * self.reach).next_power_of_two();
         let hertz: Vec<f64> = (1..=length / 2).map(|bin| bin as f64 / (length as f64 * self.apart())).collect();
-        let responses = learnable.expected(&hertz, wish.delay);
+        let responses = learnable.expected(&hertz, trial.delay);
         let mut spectra = vec![vec![Complex64::default(); length]; 7];
         for (bin, (response, hertz)) in (1..).zip(responses.iter().zip(&hertz)) {
-            let passed = wish.passed(*hertz);
+            let passed = trial.passed(*hertz);
             let mut put = |channel: usize, value: Complex64| {
                 spectra[channel][bin] = value;
                 spectra[channel][length - bin] = value.conj();
@@ -160,7 +160,7 @@ impl Grid {
             let shown = self.device_response(*hertz);
             for (mode, row) in response.iter().enumerate() {
                 let [re, im] = times(row[mode], shown);
-                put(mode, passed * wish.share(*hertz) / Complex64::new(re, im));
+                put(mode, passed * trial.share(*hertz) / Complex64::new(re, im));
             }
             put(6, Complex64::new(passed, 0.0));
         }

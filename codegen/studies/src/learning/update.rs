@@ -22,7 +22,7 @@ pub struct Update {
     /// L and Q at the frequencies that Q passes.
     bins: Vec<(Matrix6c, f64)>,
     /// Q at the frequencies that it passes if learning reaches [`Convergence::reach`].
-    wished: Vec<f64>,
+    passed_at_reach: Vec<f64>,
     to_modal: Matrix6,
     from_modal: Matrix6,
     length: usize,
@@ -56,7 +56,7 @@ impl Update {
                 .collect()
         });
         let hertz = frequencies(update.length, convergence.reach(), learnable.closed_loop.period);
-        update.wished = hertz.into_iter().map(|hertz| convergence.wished(hertz)).collect();
+        update.passed_at_reach = hertz.into_iter().map(|hertz| convergence.passed_at_reach(hertz)).collect();
         update
     }
 
@@ -73,7 +73,7 @@ impl Update {
         let length = (2 * motion.corrected).next_power_of_two();
         Self {
             bins: design(&frequencies(length, bandwidth, period)),
-            wished: Vec::new(),
+            passed_at_reach: Vec::new(),
             to_modal: learnable.closed_loop.basis.to_modal,
             from_modal: learnable.closed_loop.basis.from_modal,
             length,
@@ -152,7 +152,7 @@ impl Update {
         let mut missed = self.spectra(error);
         let repeated = coherence.repeated(&missed, self.noise(error));
         for (spectrum, shares) in missed.iter_mut().zip(&repeated) {
-            for (bin, (share, passed)) in shares.iter().zip(&self.wished).enumerate() {
+            for (bin, (share, passed)) in shares.iter().zip(&self.passed_at_reach).enumerate() {
                 spectrum[bin] *= 1.0 - share * passed;
                 if bin > 0 {
                     spectrum[self.length - bin] = spectrum[bin].conj();

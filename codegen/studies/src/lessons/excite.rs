@@ -23,17 +23,17 @@ pub(super) fn run(
     options: &Options,
     path: &Path,
     compiled: &Compilation,
-    bed: &mut impl MachineSource,
+    source: &mut impl MachineSource,
     ui: &mut Ui,
 ) -> Result<(), Failure> {
     let limit = takes_correction(compiled)?.correction.unwrap_or_default();
-    let (motion, _) = motion_of(options, bed, compiled)?;
+    let (motion, _) = motion_of(options, source, compiled)?;
     let (learnable, machine) = (learnable_of(compiled)?, machine_name(options));
     let excitation = Excitation::new(&learnable, &motion, options.bandwidth, [limit, compiled.model.sensor.noise]);
     let factors = Factors::of(&compiled.model, &[]);
     let stop = interrupt::heed();
     let names = [compiled.ir.digest.as_str(), &machine];
-    let done = bed.work(
+    let done = source.work(
         compiled,
         ui,
         |repeating, ui| {
@@ -65,12 +65,11 @@ pub(super) fn run(
             })
         },
     )?;
-    let SessionResult { found, why, down } = done;
-    match found {
-        Some(found) => ui.judged(&found, why),
-        None => {
-            Err(Failure::Gate(why.unwrap_or_else(|| format!("interrupted before the last sweep was complete{down}"))))
-        }
+    let SessionResult { result, reason, final_state } = done;
+    let interruption = || format!("interrupted before the last sweep was complete{final_state}");
+    match result {
+        Some(measured) => ui.judged(&measured, reason),
+        None => Err(Failure::Gate(reason.unwrap_or_else(interruption))),
     }
 }
 
