@@ -87,45 +87,29 @@ impl Fields {
     }
 
     pub(crate) fn list<const N: usize>(&self, path: &str) -> Option<[f64; N]> {
-        match &self.get(path)?.parsed {
-            KeyValue::Numbers(values) => values.as_slice().try_into().ok(),
-            _ => None,
-        }
+        self.numbers(path)?.try_into().ok()
     }
 
     /// All numbers of a list whose length is not fixed.
     pub(crate) fn numbers(&self, path: &str) -> Option<&[f64]> {
-        match &self.get(path)?.parsed {
-            KeyValue::Numbers(values) => Some(values),
-            _ => None,
-        }
+        let KeyValue::Numbers(values) = &self.get(path)?.parsed else { return None };
+        Some(values)
     }
 
     /// The rows of a [`super::Shape::Rows`].
     pub(crate) fn rows<const R: usize, const C: usize>(&self, path: &str) -> Option<[[f64; C]; R]> {
-        let mut rows = [[0.0; C]; R];
-        let values = self.numbers(path)?;
-        if values.len() != R * C {
-            return None;
-        }
-        for (row, found) in rows.iter_mut().zip(values.chunks_exact(C)) {
-            row.copy_from_slice(found);
-        }
-        Some(rows)
+        let (rows, []) = self.numbers(path)?.as_chunks::<C>() else { return None };
+        rows.try_into().ok()
     }
 
     pub(crate) fn flag(&self, path: &str) -> Option<bool> {
-        match self.get(path)?.parsed {
-            KeyValue::Flag(value) => Some(value),
-            _ => None,
-        }
+        let KeyValue::Flag(value) = self.get(path)?.parsed else { return None };
+        Some(value)
     }
 
     pub(crate) fn integer(&self, path: &str) -> Option<i64> {
-        match self.get(path)?.parsed {
-            KeyValue::Integer(value) => Some(value),
-            _ => None,
-        }
+        let KeyValue::Integer(value) = self.get(path)?.parsed else { return None };
+        Some(value)
     }
 
     /// An integer whose range in the key table fits `T`.
@@ -134,24 +118,18 @@ impl Fields {
     }
 
     pub(crate) fn choice(&self, path: &str) -> Option<&'static str> {
-        match self.get(path)?.parsed {
-            KeyValue::Choice(word) => Some(word),
-            _ => None,
-        }
+        let KeyValue::Choice(word) = self.get(path)?.parsed else { return None };
+        Some(word)
     }
 
     pub(crate) fn name(&self, path: &str) -> Option<&str> {
-        match &self.get(path)?.parsed {
-            KeyValue::Name(text) => Some(text),
-            _ => None,
-        }
+        let KeyValue::Name(text) = &self.get(path)?.parsed else { return None };
+        Some(text)
     }
 
     pub(crate) fn texts(&self, path: &str) -> Option<&[String]> {
-        match &self.get(path)?.parsed {
-            KeyValue::Texts(texts) => Some(texts),
-            _ => None,
-        }
+        let KeyValue::Texts(texts) = &self.get(path)?.parsed else { return None };
+        Some(texts)
     }
 
     /// The place of the value at `path`; the start of the file if it is not known.
