@@ -326,12 +326,8 @@ fn next(spec: &Path, output: &Path, summary: &Summary, mcu: model::Mcu) -> Vec<S
 
 /// Messages for every exceeded limit of `[target.budget]` or the part, and for every violation in the image.
 fn over_budget(compiled: &Compilation, summary: &Summary) -> Vec<String> {
-    let (used, checks) = match (&summary.measurement, &summary.image) {
-        (Some(m), _) => (&m.used, &m.checks),
-        (None, Some(i)) => (&i.used, &i.checks),
-        (None, None) => return Vec::new(),
-    };
-    let mut over = budget::over(&compiled.model.target, used);
-    over.extend(checks.faults.iter().map(|fault| fault.text.clone()));
+    let Some(image) = summary.measurement.as_deref().or(summary.image.as_ref()) else { return Vec::new() };
+    let mut over = budget::over(&compiled.model.target, &image.used);
+    over.extend(image.checks.faults.iter().map(|fault| fault.text.clone()));
     over
 }

@@ -8,7 +8,7 @@ use serde::Serialize;
 use specgen_compiler::assumed::Assumptions;
 use specgen_compiler::compile::Compilation;
 use specgen_language::diagnostic::Severity;
-use specgen_toolchain::budget::{self, ImageUsage, group};
+use specgen_toolchain::budget::{self, group};
 
 use crate::verify::{Inspection, Measurement};
 
@@ -89,7 +89,7 @@ impl Verdict {
     /// Adds the results of a run on the emulated machine.
     pub fn measured(&mut self, compiled: &Compilation, measurement: &Measurement) {
         self.unmeasured = None;
-        self.image(compiled, &measurement.used, measurement.checks.faults.iter().map(|fault| &fault.text));
+        self.inspected(compiled, measurement);
         if let Some(step) = measurement.stage("step") {
             self.push(Figure::new(Subject::Time, "longest tick", step.max as f64, "instructions"));
         }
@@ -107,11 +107,7 @@ impl Verdict {
 
     /// Adds the results of inspecting an image that was not run, for the reason in [`Verdict::unmeasured`].
     pub fn inspected(&mut self, compiled: &Compilation, inspection: &Inspection) {
-        self.image(compiled, &inspection.used, inspection.checks.faults.iter().map(|fault| &fault.text));
-    }
-
-    fn image<'a>(&mut self, compiled: &Compilation, used: &ImageUsage, faults: impl Iterator<Item = &'a String>) {
-        for held in budget::usage_lines(&compiled.model.target, used) {
+        for held in budget::usage_lines(&compiled.model.target, &inspection.used) {
             let (subject, unit) =
                 if held.what == "instructions" { (Subject::Time, "instructions") } else { (Subject::Memory, "bytes") };
             let figure = Figure::new(subject, held.what, held.used as f64, unit);
@@ -120,12 +116,12 @@ impl Verdict {
                 None => figure,
             });
         }
-        if used.stack.is_none() {
+        if inspection.used.stack.is_none() {
             let words = "the tick's stack is unbounded".to_owned();
             self.push(Figure::fact(Subject::Memory, "stack", words, compiled.model.target.budget.stack.is_none()));
         }
-        for fault in faults {
-            self.push(Figure::fact(Subject::Memory, "image", fault.clone(), false));
+        for fault in &inspection.checks.faults {
+            self.push(Figure::fact(Subject::Memory, "image", fault.text.clone(), false));
         }
     }
 

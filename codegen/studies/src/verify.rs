@@ -4,6 +4,7 @@
 mod legs;
 mod platform;
 
+use std::ops::Deref;
 use std::path::Path;
 use std::time::Duration;
 
@@ -56,40 +57,31 @@ pub fn exercised(library: &Path, compiled: &Compilation) -> Result<(Controller, 
 /// Cost of the image, and whether it computes the same bits.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Measurement {
-    /// Emulated machine.
-    pub machine: String,
-    /// `rustc --version` of the cross compiler.
-    pub compiler: String,
-    /// Bytes of flash, replay harness included.
-    pub flash: u64,
-    /// Of these, code.
-    pub code: u64,
-    /// Of these, constants (tables).
-    pub constants: u64,
+    /// Static figures; its checks and its use include what was measured.
+    #[serde(flatten)]
+    pub image: Inspection,
     /// Bytes of statically allocated RAM plus Config and State: everything but the stack, which [`ImageUsage::ram`] includes.
     pub ram_without_stack: u64,
     /// Bytes of State.
     pub state: u64,
-    /// Bytes of code that a tick can reach.
-    pub tick_code: u64,
-    /// Static bound of a tick's stack, bytes; `None` if it cannot be bounded.
-    pub stack_bound: Option<u64>,
     /// Measured stack use of ticks, bytes.
     pub stack_painted: u64,
-    /// Panic or allocator symbols in the image.
-    pub forbidden_symbols: Vec<String>,
     /// Instructions per stage.
     pub stages: Vec<Stage>,
     /// Ticks compared with the host.
     pub ticks: u64,
     /// First word that differs from the host's, as text.
     pub first_difference: Option<String>,
-    /// Results of the tick checks.
-    pub checks: TickChecks,
-    /// Figures for the budget.
-    pub used: ImageUsage,
     /// Time of a tick on the spec's board, if it has one; see [`time_board`].
     pub time: Option<Estimate>,
+}
+
+impl Deref for Measurement {
+    type Target = Inspection;
+
+    fn deref(&self) -> &Inspection {
+        &self.image
+    }
 }
 
 /// Static figures of an image.
@@ -171,11 +163,10 @@ pub fn inspect(image: &Image) -> Result<Inspection, TargetError> {
 /// # Errors
 /// The emulator is missing or fails, or the image was not built by specgen.
 pub fn measure(image: &Image, config: &[u64], host: &Trace) -> Result<Measurement, TargetError> {
-    let seen = inspect(image)?;
-    let mut checks = seen.checks;
+    let mut inspection = inspect(image)?;
     let (replayed, stats) = replay(image, config, host)?;
-    checks.check_painted_stack(stats.painted_stack);
-    let used = used(image, Some(&stats), &checks)?;
+    inspection.checks.check_painted_stack(stats.painted_stack);
+    inspection.used = used(image, Some(&stats), &inspection.checks)?;
     let stages = stats.stages.iter().filter(|stage| stage.calls > 0).map(|stage| Stage {
         name: stage.name.clone(),
         calls: stage.calls,
@@ -184,22 +175,13 @@ pub fn measure(image: &Image, config: &[u64], host: &Trace) -> Result<Measuremen
         max: stage.largest,
     });
     Ok(Measurement {
-        machine: seen.machine,
-        compiler: seen.compiler,
-        flash: seen.flash,
-        code: seen.code,
-        constants: seen.constants,
-        ram_without_stack: seen.ram_static + stats.state_bytes + stats.config_bytes,
+        ram_without_stack: inspection.ram_static + stats.state_bytes + stats.config_bytes,
+        image: inspection,
         state: stats.state_bytes,
-        tick_code: seen.tick_code,
-        stack_bound: seen.stack_bound,
         stack_painted: stats.painted_stack,
-        forbidden_symbols: seen.forbidden_symbols,
         stages: stages.collect(),
         ticks: stats.ticks,
         first_difference: first_difference(host, &replayed).map(|difference| difference.to_string()),
-        checks,
-        used,
         time: None,
     })
 }
