@@ -8,6 +8,7 @@ mod operator;
 mod passes;
 mod platform;
 mod pose;
+mod settings;
 mod triggers;
 mod watch;
 mod waves;

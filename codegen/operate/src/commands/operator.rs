@@ -11,14 +11,13 @@ use specgen_link::{RecorderStatus, Refusal, Status};
 use specgen_runtime::setpoint::{BUSY, REFUSED};
 use specgen_runtime::supervisor::{Phase, Request};
 
-use super::answer::{Acknowledgement, Answer, Destination, DownloadReport, MachineStatus, RecorderState, Settings};
+use super::answer::{Acknowledgement, Answer, Destination, DownloadReport, MachineStatus, RecorderState};
 use super::error::{SessionError, unsupported, waving};
 use super::health::StatusReport;
 use super::pose::{ZERO, in_words};
 use crate::command::{Command, WaitCondition};
 use crate::frame::Frame;
 use crate::session::{POLL_INTERVAL, Session};
-use specgen_compiler::compile;
 use specgen_language::files;
 use specgen_language::model::Model;
 use specgen_language::outcome::{Failure, Outcome};
@@ -442,17 +441,6 @@ impl<P: Port> Operator<P> {
         )))
     }
 
-    fn config(&mut self) -> Result<Settings, SessionError> {
-        let words = self.session.config()?;
-        let description = self.session.description();
-        let value = |name: &str, word: u64| match host_sim::word::WordKind::of(name) {
-            host_sim::word::WordKind::Integer => json!(word),
-            host_sim::word::WordKind::Real => json!(description.scalar.decode(word)),
-        };
-        let names = description.config_names.iter();
-        Ok(Settings(names.zip(words).map(|(name, word)| (name.clone(), value(name, word))).collect()))
-    }
-
     /// Runs `work` in a thread, and keeps the link alive meanwhile.
     pub(super) fn meanwhile<T: Send>(&mut self, work: impl FnOnce() -> T + Send) -> Result<T, SessionError> {
         std::thread::scope(|scope| {
@@ -463,54 +451,6 @@ impl<P: Port> Operator<P> {
             }
             // The panic hook has reported where.
             work.join().map_err(|_| SessionError::Failed(Failure::Environment("the spec compiler crashed".to_owned())))
-        })
-    }
-
-    /// Writes the settings of a spec to the device, without its tables.
-    fn write_config(&mut self, path: &Path) -> Result<(), SessionError> {
-        let compiled =
-            self.meanwhile(|| compile::compile(path))?.map_err(|refused| SessionError::Failed(refused.into()))?;
-        let (ours, theirs) = (&compiled.ir, self.session.description());
-        let words = &compiled.ir.integrity.settings;
-        if ours.scalar.bits() != theirs.scalar.bits() || words.len() != theirs.config_names.len() {
-            return Err(SessionError::Refused(format!(
-                "{} has {} settings in f{}, the device has {} in f{}: the spec must have the same kind and scalar as the device's",
-                path.display(),
-                words.len(),
-                ours.scalar.bits(),
-                theirs.config_names.len(),
-                theirs.scalar.bits()
-            )));
-        }
-        let of = path.display();
-        self.configure(words, |name| format!("the device refused `{name}` of {of}: out of its range"))
-    }
-
-    /// Index of a setting.
-    pub(super) fn setting(&self, name: &str) -> Option<usize> {
-        self.session.description().config_names.iter().position(|known| known == name)
-    }
-
-    /// The settings in force, with these words changed.
-    pub(super) fn changed(&mut self, words: &[(String, u64)]) -> Result<Vec<u64>, SessionError> {
-        let mut settings = self.session.config()?;
-        for (name, word) in words {
-            if let Some(slot) = self.setting(name).and_then(|place| settings.get_mut(place)) {
-                *slot = *word;
-            }
-        }
-        Ok(settings)
-    }
-
-    /// Sends all settings. `refused` is the message about a setting of this name that the device refuses.
-    pub(crate) fn configure(&mut self, words: &[u64], refused: impl Fn(&str) -> String) -> Result<(), SessionError> {
-        self.in_control = true;
-        self.session.write_config(words).map_err(|error| match error {
-            ClientError::Refused(Refusal::Word { index }) => {
-                let name = self.session.description().config_names.get(usize::from(index));
-                SessionError::Refused(refused(name.map_or("?", String::as_str)))
-            }
-            other => other.into(),
         })
     }
 
