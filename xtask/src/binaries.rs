@@ -24,7 +24,8 @@ pub struct Mode {
 }
 
 /// Modules whose tests mostly wait, for time or for another process.
-const WAITING: [&str; 4] = ["cli all::rt_pc", "cli all::operate", "cli all::kills", "cli all::interrupt"];
+const WAITING: [&str; 6] =
+    ["cli all::rt_pc", "cli all::operate", "cli all::kills", "cli all::interrupt", "cli all::pil", "cli all::files"];
 
 /// Packages without tests; their libraries, or what only benchmarks depend on, would be compiled for nothing.
 const WITHOUT_TESTS: [&str; 4] = ["controller", "controller-with-passes", "specgen-law", "specgen-benches"];

@@ -36,7 +36,7 @@ fn stops(machine: &Machine) -> Vec<StopRun> {
 
 #[test]
 fn a_dry_stream_stands_soon_near_and_with_no_leg_limited() {
-    let machines = machines(length(2, usize::MAX));
+    let machines = machines(length(1, usize::MAX));
     let all = in_parallel(machines.len() as u32, |index| stops(&machines[index as usize]));
     for (machine, ran) in machines.iter().zip(&all) {
         let stated = machine.stated();

@@ -337,6 +337,7 @@ const PARTS: (&str, &str) = (
 );
 
 #[test]
+#[ignore = "long: another controller; one with a leg model of every part is in the short run"]
 fn a_platform_with_every_part_of_the_law_has_the_bits_of_the_emitted_one() {
     let damping = specgen_tests::active_damping();
     let parts = format!("[control]\nhand_over = true\ncorrection = \"2 um\"\n{damping}");

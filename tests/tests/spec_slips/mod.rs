@@ -245,7 +245,7 @@ fn every_fix_that_is_offered_is_accepted_by_the_next_check() {
                 }
             }
         };
-    for (slip, (text, found)) in caught().iter().step_by(specgen_tests::length(4, 1)) {
+    for (slip, (text, found)) in caught().iter().step_by(specgen_tests::length(8, 1)) {
         let base = &bases[&slip.of];
         let next = |text: &str| verdict(text, base.folder.path()).1;
         (0..found.len()).for_each(|at| try_fix(&format!("{:?}", slip.edits), found, at, text, &next));
