@@ -1,5 +1,7 @@
 //! Variable projection: one family on the samples of one record.
 
+use core::array::from_fn;
+
 use nalgebra::DMatrix;
 use specgen_language::interrupt;
 use specgen_numerics::simplex;
@@ -19,6 +21,8 @@ const STARTS: usize = 3;
 const RIDGE: f64 = 1e-10;
 /// Evaluations of a search for each unknown: from the fixed start, and from the solution on all curves.
 const SEARCH: [usize; 2] = [45, 15];
+/// Samples that are summed at once: their sums are read and written once.
+const LANES: usize = 4;
 
 /// A record for the fit: at most some thousand samples.
 pub(super) struct Samples {
@@ -204,17 +208,26 @@ impl<'a> Problem<'a> {
             fixed.extend(TIMES[..starts].iter().map(|tau| libm::exp((samples.time[0] - t) / tau)));
         }
         let folds = samples.folds.iter().flatten().fold(0, |most, fold| if *fold < most { most } else { fold + 1 });
-        let mut grams = vec![DMatrix::zeros(width, width); folds + 1];
+        let mut grams = vec![vec![0.0; width * width]; folds + 1];
         for (fold, span) in samples.branches(None) {
             let gram = &mut grams[fold.unwrap_or(folds)];
             let level = level(&fixed[span.start * width..span.end * width], width, family);
-            for row in fixed[span.start * width..span.end * width].chunks_exact(width) {
-                let centred: Vec<f64> = row.iter().zip(&level).map(|(value, level)| value - level).collect();
-                for (c, value) in centred.iter().enumerate() {
-                    gram.column_mut(c).iter_mut().zip(&centred).for_each(|(sum, other)| *sum += value * other);
+            for rows in fixed[span.start * width..span.end * width].chunks(LANES * width) {
+                let mut centred = rows.to_vec();
+                for row in centred.chunks_exact_mut(width) {
+                    row.iter_mut().zip(&level).for_each(|(value, level)| *value -= level);
+                }
+                let rows = lanes(&centred, width);
+                for (c, sums) in gram.chunks_exact_mut(width).enumerate() {
+                    accumulate(&mut sums[c..], rows.map(|row| row.map_or(0.0, |row| row[c])), rows, c);
                 }
             }
         }
+        // Only from the diagonal on: a Gram matrix is symmetric.
+        let whole = |gram: Vec<f64>| {
+            DMatrix::from_fn(width, width, |r, c| if r < c { gram[r * width + c] } else { gram[c * width + r] })
+        };
+        let grams = grams.into_iter().map(whole).collect();
         let unit = samples.y.iter().fold(0.0, |most: f64, y| if y.abs() > most { y.abs() } else { most });
         Self { samples, family, plays, unit, fixed, width, bounded, grams }
     }
@@ -266,15 +279,14 @@ impl<'a> Problem<'a> {
                 all.extend(&row);
             }
             let level = level(&all, count, self.family);
-            let fixed = self.fixed[span.start * self.width..span.end * self.width].chunks_exact(self.width);
+            let fixed = self.fixed[span.start * self.width..span.end * self.width].chunks(LANES * self.width);
             // One centred factor is enough.
-            for (fixed, own) in fixed.zip(all.chunks_exact(count)) {
-                for (a, (value, level)) in own.iter().zip(&level).enumerate() {
-                    let value = value - level;
-                    let sums = &mut cross[a * self.width..(a + 1) * self.width];
-                    sums.iter_mut().zip(fixed).for_each(|(sum, other)| *sum += value * other);
-                    let sums = &mut square[a * count..(a + 1) * count];
-                    sums.iter_mut().zip(own).for_each(|(sum, other)| *sum += value * other);
+            for (fixed, own) in fixed.zip(all.chunks(LANES * count)) {
+                let (fixed, own) = (lanes(fixed, self.width), lanes(own, count));
+                for (a, level) in level.iter().enumerate() {
+                    let centred = own.map(|row| row.map_or(0.0, |row| row[a] - level));
+                    accumulate(&mut cross[a * self.width..(a + 1) * self.width], centred, fixed, 0);
+                    accumulate(&mut square[a * count..(a + 1) * count], centred, own, 0);
                 }
             }
         }
@@ -405,6 +417,25 @@ impl<'a> Problem<'a> {
         let (plays, rest) = values.split_at(self.bounded);
         let (taken, rest) = if self.family.has_state() { (rest[0], &rest[1..]) } else { (0.0, rest) };
         (plays, taken, rest[0], &rest[self.width - self.bounded..])
+    }
+}
+
+/// Up to [`LANES`] rows.
+fn lanes(rows: &[f64], width: usize) -> [Option<&[f64]>; LANES] {
+    from_fn(|n| rows.get(n * width..(n + 1) * width))
+}
+
+/// Adds each row from a column on, times its weight, to the sums, in their order.
+fn accumulate(sums: &mut [f64], weights: [f64; LANES], rows: [Option<&[f64]>; LANES], column: usize) {
+    let count = sums.len();
+    if let [Some(a), Some(b), Some(c), Some(d)] = rows.map(|row| row.map(|row| &row[column..column + count])) {
+        for k in 0..count {
+            sums[k] = sums[k] + weights[0] * a[k] + weights[1] * b[k] + weights[2] * c[k] + weights[3] * d[k];
+        }
+        return;
+    }
+    for (weight, row) in weights.iter().zip(rows.iter().flatten()) {
+        sums.iter_mut().zip(&row[column..]).for_each(|(sum, value)| *sum += weight * value);
     }
 }
 
