@@ -97,7 +97,7 @@ fn choose(record: &Record, drive: [f64; 2], dead_time: DeadTime, findings: &mut 
         return None;
     };
     let tau = match dead_time {
-        DeadTime::Estimate => dead_time::estimate(&probe, record, used.first, &used.branches).0,
+        DeadTime::Estimate | DeadTime::FromTurns => dead_time::estimate(&probe, record, used.first, &used.branches).0,
         DeadTime::Fixed(tau) => tau,
     };
     let scale = 1.0 / record.displacement_range();

@@ -61,6 +61,7 @@ pub mod states;
 mod statistics;
 pub mod stiffness;
 mod sweep;
+mod turns;
 pub mod waveform;
 
 use crate::everett::EverettTable;
@@ -116,6 +117,9 @@ impl Options {
 pub enum DeadTime {
     /// Estimate it if the record has branches of different rates, otherwise zero.
     Estimate,
+    /// The same, but from the turns of a triangular drive if it has some that are sampled finely: creep is not taken for a
+    /// dead time there.
+    FromTurns,
     /// This many seconds, ≥ 0.
     Fixed(f64),
 }
@@ -162,6 +166,7 @@ fn identify_checked(
     let mut used = selection::usable(record, &plane, findings)?;
     let (dead_time, dead_time_basis) = match options.dead_time {
         DeadTime::Estimate => dead_time::estimate(&plane, record, used.first, &used.branches),
+        DeadTime::FromTurns => dead_time::from_turns(&plane, record, used.first, &used.branches),
         DeadTime::Fixed(tau) => (if tau > 0.0 { tau } else { 0.0 }, "given".to_owned()),
     };
     used.until(dead_time::within(record, dead_time));

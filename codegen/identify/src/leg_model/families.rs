@@ -14,7 +14,7 @@ use crate::record::Record;
 use crate::regressor::{self, Plane};
 use crate::staircase::Staircase;
 use crate::statistics::{mean, mean_and_error};
-use crate::{Identification, dead_time, grid_choice, identify, prior, selection};
+use crate::{DeadTime, Identification, dead_time, grid_choice, identify, prior, selection};
 use specgen_language::diagnostic::{Diagnostic, codes};
 use specgen_language::model::LegModelKind as Kind;
 
@@ -59,7 +59,9 @@ pub struct Choice {
 /// As [`identify`]; E0622 if the curves turn back at too few voltages to hold any out.
 pub fn choose(record: &Record, options: &crate::Options, kind: Kind) -> Result<Choice, Vec<Diagnostic>> {
     // A table has a weight for each of its cells, so those that are compared with leg models stay coarse.
-    let coarse = crate::Options { grid: if options.grid > PLAYS { PLAYS } else { options.grid }, ..*options };
+    let dead_time = if options.dead_time == DeadTime::Estimate { DeadTime::FromTurns } else { options.dead_time };
+    let coarse =
+        crate::Options { grid: if options.grid > PLAYS { PLAYS } else { options.grid }, dead_time, ..*options };
     let table = identify(record, if kind == Kind::Preisach { options } else { &coarse })?;
     if kind == Kind::Preisach {
         let family = Family { kind, creep: false };

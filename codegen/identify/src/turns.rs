@@ -1,0 +1,106 @@
+//! Lag of the displacement behind the drive, from the turns of a triangular drive.
+//!
+//! Around a turn, creep, rate dependence and memory are smooth functions of the drive's distance from the turn; only a
+//! lag shifts the kink between them. On each side the displacement is fitted by a cubic polynomial of that distance,
+//! both with the same value at the turn. The distance is that of a drive behind a first-order lag, as an amplifier has
+//! it: such a drive turns later and less far, and after it the hysteresis starts from there.
+
+use super::branches::Branch;
+use super::dead_time;
+use super::least_squares;
+use super::record::Record;
+
+/// Longest part of a branch beside a turn, s, and as a fraction of the branch.
+const WINDOW: f64 = 20e-3;
+const OF_BRANCH: f64 = 0.8;
+/// Fewest samples on either side.
+const SAMPLES: usize = 8;
+/// Largest distance of the drive from a straight line there, as a fraction of its way.
+const STRAIGHT: f64 = 0.01;
+/// Degree of the polynomials.
+const DEGREE: usize = 3;
+/// Fewest turns.
+const TURNS: usize = 4;
+
+/// A turn between two straight parts.
+struct Turn {
+    /// Time (s) from the turn, and displacement, of each sample.
+    samples: Vec<[f64; 2]>,
+    /// Slope of the drive before and after, V/s.
+    slopes: [f64; 2],
+}
+
+/// The lag and its standard error, s; none if too few turns are sharp and sampled finely enough.
+pub(super) fn lag(record: &Record, branches: &[Branch]) -> Option<[f64; 2]> {
+    let turns: Vec<Turn> = branches.windows(2).filter_map(|pair| turn(record, [pair[0], pair[1]])).collect();
+    if turns.len() < TURNS {
+        return None;
+    }
+    let squares = |lag: f64| turns.iter().try_fold(0.0, |sum, turn| Some(sum + turn.square(lag)?));
+    let squares = |lags: &[f64]| lags.iter().map(|lag| squares(*lag)).collect::<Option<Vec<f64>>>();
+    let found = dead_time::search(dead_time::longest(record, branches), squares)?;
+    // Of the parabola around the least one.
+    let (lag, near) = (found.dead_time, 0.1 * found.dead_time);
+    let [below, least, above] = squares(&[lag - near, lag, lag + near])?[..] else { return None };
+    let free = turns.iter().fold(0, |sum, turn| sum + turn.samples.len() - (2 * DEGREE + 1));
+    let variance = 2.0 * near * near * least / (free as f64 * (below - 2.0 * least + above));
+    (!found.at_end && variance > 0.0).then(|| [lag, variance.sqrt()])
+}
+
+/// The turn between two branches, unless the drive rests there or is not straight.
+fn turn(record: &Record, [before, after]: [Branch; 2]) -> Option<Turn> {
+    let (time, drive, at) = (&record.time, &record.drive, after.first);
+    let longest = |b: Branch| OF_BRANCH * (time[b.end - 1] - time[b.first]);
+    let within = |b: Branch| if longest(b) < WINDOW { longest(b) } else { WINDOW };
+    let from = time.partition_point(|t| *t < time[at] - within(before));
+    let end = time.partition_point(|t| *t <= time[at] + within(after));
+    if before.end != at + 1 || at < from + SAMPLES || end < at + 1 + SAMPLES {
+        return None;
+    }
+    // Slope of the line through the ends of a part, if all of it is near the line.
+    let line = |first: usize, last: usize| {
+        let way = drive[last] - drive[first];
+        let slope = way / (time[last] - time[first]);
+        let off = |k: usize| (drive[k] - drive[first] - slope * (time[k] - time[first])).abs();
+        (first..last).all(|k| off(k) <= STRAIGHT * way.abs()).then_some(slope)
+    };
+    let slopes = [line(from, at - 1)?, line(at + 1, end - 1)?];
+    // Where the two lines meet.
+    let [into, out] = slopes;
+    let (u, v) = (drive[at - 1] - into * time[at - 1], drive[at + 1] - out * time[at + 1]);
+    let corner = (v - u) / (into - out);
+    let used = (from..end).filter(|k| !record.weightless[*k]);
+    let samples: Vec<[f64; 2]> = used.map(|k| [time[k] - corner, record.displacement[k]]).collect();
+    (into * out < 0.0 && samples.len() > 2 * SAMPLES).then_some(Turn { samples, slopes })
+}
+
+impl Turn {
+    /// Σ of squares that the polynomials leave with this lag (s).
+    fn square(&self, lag: f64) -> Option<f64> {
+        let [into, out] = self.slopes;
+        // Time and distance by which the lagged drive turns late.
+        let late = lag * libm::log(1.0 - into / out);
+        let lagged = |t: f64| {
+            let decay = |t: f64| if lag > 0.0 { libm::exp(-t / lag) } else { 0.0 };
+            if t <= 0.0 { into * (t - lag) } else { out * (t - lag) - (into - out) * lag * decay(t) }
+        };
+        let turned = out * late;
+        let mut columns = vec![vec![0.0; self.samples.len()]; 2 * DEGREE + 1];
+        let mut y = Vec::with_capacity(self.samples.len());
+        let unit = 1.0 / (into.abs() * WINDOW);
+        for (k, [t, displacement]) in self.samples.iter().enumerate() {
+            let distance = unit * (lagged(*t) - turned);
+            let side = if *t < late { 1 } else { 1 + DEGREE };
+            columns[0][k] = 1.0;
+            let mut power = 1.0;
+            for column in &mut columns[side..side + DEGREE] {
+                power *= distance;
+                column[k] = power;
+            }
+            y.push(*displacement);
+        }
+        let columns: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
+        let residual = least_squares::fit(&columns, &y)?.residual;
+        Some(least_squares::dot(&residual, &residual))
+    }
+}
