@@ -32,6 +32,8 @@ const SAMPLES: usize = 100_000;
 /// is zero.
 const WORTHWHILE: f64 = 0.1;
 const CERTAIN: f64 = 5.0;
+/// How the basis of an estimate from the turns begins.
+pub(crate) const AT_TURNS: &str = "estimated where the drive turns";
 /// Largest standard error of an estimate from the turns, s.
 const USEFUL: f64 = 5e-5;
 /// Loops are nested if half of the rises begin above this share of the drive's range.
@@ -76,9 +78,7 @@ pub fn estimate(plane: &Plane, record: &Record, first: usize, branches: &[Branch
 /// The same from the turns of the drive, if their standard error is small enough.
 pub(super) fn from_turns(plane: &Plane, record: &Record, first: usize, branches: &[Branch]) -> (f64, String) {
     match turns::lag(record, branches) {
-        Some([lag, error]) if error < USEFUL => {
-            (lag, format!("estimated where the drive turns, standard error {:.3} ms", error * 1e3))
-        }
+        Some([lag, error]) if error < USEFUL => (lag, format!("{AT_TURNS}, standard error {:.3} ms", error * 1e3)),
         _ => estimate(plane, record, first, branches),
     }
 }
@@ -233,4 +233,19 @@ impl Shift {
             (Some(last), None) => y[last],
         }
     }
+}
+
+/// Drive (V) of a record behind a first-order lag (s, > 0), exact for straight lines between the samples.
+#[must_use]
+pub(super) fn lagged(record: &Record, lag: f64) -> Vec<f64> {
+    let mut late: Option<f64> = None;
+    let pairs = record.time.windows(2).zip(record.drive.windows(2)).map(|(t, u)| [t[1] - t[0], u[0], u[1]]);
+    let first = record.drive.first().copied().map(|u| [1.0, u, u]);
+    let step = |[interval, before, now]: [f64; 3]| {
+        let behind = lag * (now - before) / interval;
+        let value = now - behind + (late.unwrap_or(before) - before + behind) * libm::exp(-interval / lag);
+        late = Some(value);
+        value
+    };
+    first.into_iter().chain(pairs).map(step).collect()
 }
