@@ -30,6 +30,7 @@ mod platform_reach;
 mod rate_specs;
 mod recording;
 mod records;
+mod refit;
 mod report;
 mod reproducible;
 mod robust;

@@ -35,6 +35,32 @@ const READ_OUT: usize = 5;
 /// Largest number of creep operators, as in `hysteresis.creep_times`.
 const MOST_CREEP_TERMS: usize = 6;
 
+const NOT_RISING: &str = "the read-out does not rise over its travel";
+
+/// T₃, the Chebyshev polynomial: ±1 at ±1.
+pub(crate) fn third(s: f64) -> f64 {
+    (4.0 * s * s - 3.0) * s
+}
+
+/// Coefficients of x, x², … whose sum is nearest to `y`, and what is left of y; x rises to a positive value.
+fn through_zero(x: &[f64], y: &[f64]) -> Option<([f64; READ_OUT], Vec<f64>)> {
+    let unit = *x.last()?;
+    let scaled: Vec<f64> = x.iter().map(|x| x / unit).collect();
+    let mut columns: Vec<Vec<f64>> = vec![scaled.clone()];
+    for k in 1..READ_OUT {
+        columns.push(columns[k - 1].iter().zip(&scaled).map(|(power, x)| power * x).collect());
+    }
+    let columns: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
+    let fit = least_squares::fit(&columns, y)?;
+    let mut coefficients = [0.0; READ_OUT];
+    let mut power = 1.0;
+    for (own, c) in coefficients.iter_mut().zip(&fit.coefficients) {
+        power *= unit;
+        *own = c / power;
+    }
+    Some((coefficients, fit.residual))
+}
+
 /// Parameters of a leg model in addition to its table: the line `# leg-model` of the table's file. The equations are those
 /// of the module, but the Bouc-Wen state here is A z, in µm.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -91,7 +117,7 @@ impl Around {
         }
         match self.inverse() {
             Some(_) => Ok(self),
-            None => Err("the read-out does not rise over its travel".to_owned()),
+            None => Err(NOT_RISING.to_owned()),
         }
     }
 
@@ -111,32 +137,39 @@ impl Around {
     /// monotonic there.
     #[must_use]
     pub fn inverse(&self) -> Option<([f64; READ_OUT], f64)> {
-        const POINTS: usize = 64;
-        let [low, high] = self.range();
-        let (middle, half) = (0.5 * (low + high), 0.5 * (high - low));
-        // Chebyshev points, ascending: they keep the error small at the ends.
-        let angle = |k: usize| core::f64::consts::PI * (k as f64 + 0.5) / POINTS as f64;
-        let h: Vec<f64> = (0..POINTS).map(|k| middle - half * libm::cos(angle(k))).collect();
+        let h = self.points();
         let p: Vec<f64> = h.iter().map(|h| self.read_out(*h)).collect();
         if p.windows(2).any(|pair| pair[1] <= pair[0]) {
             return None;
         }
-        let unit = p[POINTS - 1];
-        let scaled: Vec<f64> = p.iter().map(|p| p / unit).collect();
-        let mut columns: Vec<Vec<f64>> = vec![scaled.clone()];
-        for k in 1..READ_OUT {
-            columns.push(columns[k - 1].iter().zip(&scaled).map(|(power, p)| power * p).collect());
-        }
-        let columns: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
-        let fit = least_squares::fit(&columns, &h)?;
-        let mut inverse = [0.0; READ_OUT];
-        let mut power = 1.0;
-        for (own, c) in inverse.iter_mut().zip(&fit.coefficients) {
-            power *= unit;
-            *own = c / power;
-        }
-        let worst = fit.residual.iter().fold(0.0, |most: f64, r| if r.abs() > most { r.abs() } else { most });
+        let (inverse, residual) = through_zero(&p, &h)?;
+        let worst = residual.iter().fold(0.0, |most: f64, r| if r.abs() > most { r.abs() } else { most });
         Some((inverse, worst))
+    }
+
+    /// Values of h over the range, µm: Chebyshev points, ascending: they keep the error small at the ends.
+    fn points(&self) -> Vec<f64> {
+        const POINTS: usize = 64;
+        let [low, high] = self.range();
+        let (middle, half) = (0.5 * (low + high), 0.5 * (high - low));
+        let angle = |k: usize| core::f64::consts::PI * (k as f64 + 0.5) / POINTS as f64;
+        (0..POINTS).map(|k| middle - half * libm::cos(angle(k))).collect()
+    }
+
+    /// The same leg with the displacement before its creep, h, multiplied by `gain`, plus `cubic` (share of the travel)
+    /// times the Chebyshev polynomial T₃ over the travel. Its table is multiplied by `gain`, too.
+    ///
+    /// # Errors
+    /// As [`Self::validate`].
+    pub fn refitted(&self, gain: f64, cubic: f64) -> Result<Self, String> {
+        let travel = self.travel_um;
+        let of = |h: f64| gain * h + cubic * travel * (third(2.0 * h / travel - 1.0) + 1.0);
+        let h = self.points();
+        let moved: Vec<f64> = h.iter().map(|h| of(*h)).collect();
+        let p: Vec<f64> = h.iter().map(|h| gain * self.read_out(*h)).collect();
+        let (read_out, _) = through_zero(&moved, &p).ok_or_else(|| NOT_RISING.to_owned())?;
+        let (slope, rest_um) = (gain * self.slope, gain * self.rest_um);
+        Self { read_out, travel_um: of(travel), slope, rest_um, ..self.clone() }.validate()
     }
 
     /// The state A z, µm, after a step of the drive (V) from the state `before` (µm).

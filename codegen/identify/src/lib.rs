@@ -17,7 +17,7 @@
 //! | [`leg_model`] | families of leg models fitted to a record, and the choice among them |
 //! | [`rate`] | records at several rates: dead time, dynamic Preisach (6), creep, each tested on the rate it was not fitted on |
 //! | [`response`], [`gauge`], [`stiffness`] | another record to an [`Estimate`] of values of the spec |
-//! | [`linear`], [`gains`] | records at several frequencies, and runs of a machine, to values of the spec |
+//! | [`linear`], [`gains`], [`refit`] | records at several frequencies, and runs of a machine, to values of the spec |
 //! | [`declared`] | the records that a spec names, compared with the spec |
 //! | [`waveform`] | tables of poses from CSV, every bad row reported |
 
@@ -49,6 +49,7 @@ mod prior;
 pub mod rate;
 mod reading;
 mod record;
+pub mod refit;
 pub mod regressor;
 mod report;
 mod residual;

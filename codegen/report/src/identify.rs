@@ -7,6 +7,8 @@ pub mod gains;
 pub mod linear;
 pub mod predict;
 pub mod rate;
+mod recorded_run;
+pub mod refit;
 
 use serde::Serialize;
 use specgen_identify::Reading;

@@ -48,6 +48,8 @@ pub struct Options {
     pub emitted: bool,
     /// Length of the record, s.
     pub seconds: f64,
+    /// Amplitude of the record's third axis, or of each leg, relative to its free range.
+    pub amplitude: f64,
 }
 
 /// Default frequencies of motions, Hz.

@@ -236,6 +236,8 @@ Examples:
   specgen identify record.csv --drive 0:100 --grid 16 -o table.csv
   specgen identify record.csv --drive 0:100 --columns drive_V=2 --rate 51.2
       drive in column 2, time from the sampling rate
+  specgen identify run.rec --spec platform.toml -o legs
+      legs that changed since identification; six tables to legs/
   specgen identify linear 1hz.csv 10hz.csv       # one frequency per record";
 
 pub const LINEAR: &str = "\

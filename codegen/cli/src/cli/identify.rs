@@ -1,7 +1,7 @@
 //! `specgen identify`: turns measured records into tables, lines of a spec, figures and plots.
 //!
-//! `specgen identify RECORD` identifies the Everett table; the other kinds are subcommands. A record with the name of a
-//! subcommand is given as `./linear`.
+//! `specgen identify RECORD` identifies the Everett table, or refits the legs if the record is a recorded run; the other
+//! kinds are subcommands. A record with the name of a subcommand is given as `./linear`.
 
 use clap::{Args, Subcommand};
 use specgen_identify::mode::Mode;
@@ -9,10 +9,10 @@ use specgen_identify::{DeadTime, Reading};
 use specgen_language::model::LegModelKind;
 use specgen_language::outcome::Failure;
 use specgen_language::ui::Ui;
-use specgen_report::identify::{Bench, estimates, everett, gains, linear, predict, rate};
+use specgen_report::identify::{Bench, estimates, everett, gains, linear, predict, rate, refit};
 
 use super::number::number;
-use super::path_roles::{InputFile, OutputFile, OutputFolder};
+use super::path_roles::{InputFile, OutputFile, OutputFileOrFolder, OutputFolder};
 use super::plot::Plot;
 
 /// Arguments of `identify`.
@@ -20,7 +20,7 @@ use super::plot::Plot;
 #[command(
     args_conflicts_with_subcommands = true,
     subcommand_negates_reqs = true,
-    override_usage = "specgen identify [OPTIONS] --drive <MIN:MAX> <RECORD>\n       specgen identify <COMMAND>",
+    override_usage = "specgen identify [OPTIONS] --drive <MIN:MAX> <RECORD>\n       specgen identify [OPTIONS] --spec <SPEC> <RUN.rec>\n       specgen identify <COMMAND>",
     after_help = super::examples::IDENTIFY
 )]
 pub struct Arguments {
@@ -51,12 +51,16 @@ enum Kind {
 /// Arguments of `identify RECORD`.
 #[derive(Args, Debug)]
 struct EverettArguments {
-    /// Reversal-curve record (CSV, MATLAB, HDF5, TDMS) with columns time_s, drive_V, displacement_um.
+    /// Reversal-curve record (CSV, MATLAB, HDF5, TDMS) with columns time_s, drive_V, displacement_um. With --spec: a recorded
+    /// run of a platform, from which gain, delay and cubic term of each leg are refitted.
     #[arg(required = true)]
     record: Option<InputFile>,
     /// Voltage range of the table, V, such as 0:100 or -90:90.
-    #[arg(long, value_name = "MIN:MAX", value_parser = range, allow_hyphen_values = true, required = true)]
+    #[arg(long, value_name = "MIN:MAX", value_parser = range, allow_hyphen_values = true)]
     drive: Option<[f64; 2]>,
+    /// The spec that the target of a recorded run was built from. It has the range and the grid.
+    #[arg(long, value_name = "SPEC", conflicts_with_all = ["drive", "grid", "dead_time", "model", "validate", "columns", "rate", "plot"])]
+    spec: Option<InputFile>,
     /// Cells per axis of the Preisach grid; chosen by cross-validation over whole curves if not given.
     #[arg(long, value_name = "N", value_parser = grid, allow_negative_numbers = true)]
     grid: Option<usize>,
@@ -69,9 +73,10 @@ struct EverettArguments {
     /// A second record of the leg, not used in the fit, to validate the table.
     #[arg(long, value_name = "RECORD")]
     validate: Option<InputFile>,
-    /// Write the table to this file (CSV: up_V, down_V, everett_um).
-    #[arg(short, long, value_name = "FILE")]
-    output: Option<OutputFile>,
+    /// Write the table to this file (CSV: up_V, down_V, everett_um). With --spec: the folder for six tables, leg1.csv to
+    /// leg6.csv, within that of the spec.
+    #[arg(short, long, value_name = "FILE|DIR")]
+    output: Option<OutputFileOrFolder>,
     #[command(flatten)]
     bench: BenchArguments,
 }
@@ -301,18 +306,27 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
         Some(Kind::Rate(RateArguments { records, drive, grid, hold_out, output, bench })) => {
             rate::run(records, *drive, *grid, hold_out.as_deref(), output.as_deref(), &bench.bench()?, ui)
         }
-        None => {
-            let EverettArguments { record, drive, grid, dead_time, model, validate, output, bench } =
-                &arguments.everett;
-            // clap requires both unless there is a subcommand.
-            let (Some(record), Some(drive)) = (record, drive) else {
-                return Err(Failure::Usage(
-                    "expected a record and --drive, or a command: see `specgen identify --help`".to_owned(),
-                ));
-            };
-            let dead_time = dead_time.map_or(DeadTime::Estimate, |ms| DeadTime::Fixed(ms * 1e-3));
-            let options = everett::Options { drive: *drive, grid: *grid, dead_time, model: *model };
-            everett::run(record, &options, validate.as_deref(), output.as_deref(), &bench.bench()?, ui)
-        }
+        None => record(&arguments.everett, ui),
     }
+}
+
+/// A record without a command: a recorded run, or reversal curves.
+fn record(arguments: &EverettArguments, ui: &mut Ui) -> Result<(), Failure> {
+    let EverettArguments { record, drive, spec, grid, dead_time, model, validate, output, bench } = arguments;
+    let usage = |text: &str| Err(Failure::Usage(text.to_owned()));
+    // clap requires it unless there is a subcommand.
+    let Some(record) = record else { return usage("expected a record: see `specgen identify --help`") };
+    if let Some(spec) = spec {
+        return refit::run(record, spec, output.as_deref(), ui);
+    }
+    if refit::is_recorded_run(record) {
+        return usage(&format!(
+            "`{}` is a recorded run: give the spec of its target with --spec SPEC",
+            record.display()
+        ));
+    }
+    let Some(drive) = drive else { return usage("expected the voltage range of the table, --drive MIN:MAX in V") };
+    let dead_time = dead_time.map_or(DeadTime::Estimate, |ms| DeadTime::Fixed(ms * 1e-3));
+    let options = everett::Options { drive: *drive, grid: *grid, dead_time, model: *model };
+    everett::run(record, &options, validate.as_deref(), output.as_deref(), &bench.bench()?, ui)
 }

@@ -58,6 +58,8 @@ named! {
     InputFile
     /// A file that the command writes.
     OutputFile
+    /// A file that the command writes, or a folder that it writes files into.
+    OutputFileOrFolder
     /// A folder that the command writes files into, or a prefix of their names.
     OutputFolder
     /// A device or a socket.
@@ -95,6 +97,9 @@ fn collect(matches: &ArgMatches, inputs: &mut Vec<PathBuf>, outputs: &mut Vec<Pa
         if let Ok(Some(found)) = matches.try_get_many::<OutputFile>(id) {
             outputs.extend(found.map(|one| one.0.clone()));
         }
+        if let Ok(Some(found)) = matches.try_get_many::<OutputFileOrFolder>(id) {
+            outputs.extend(found.filter(|one| !one.0.is_dir()).map(|one| one.0.clone()));
+        }
     }
     if let Some((_, below)) = matches.subcommand() {
         collect(below, inputs, outputs);
@@ -108,6 +113,7 @@ pub fn role(argument: &clap::Arg) -> Option<Role> {
     let roles = [
         (ValueParser::from(InputFile::value_parser()), Role::Input),
         (ValueParser::from(OutputFile::value_parser()), Role::Output),
+        (ValueParser::from(OutputFileOrFolder::value_parser()), Role::Output),
         (ValueParser::from(OutputFolder::value_parser()), Role::Folder),
         (ValueParser::from(Endpoint::value_parser()), Role::Endpoint),
         (ValueParser::path_buf(), Role::Unknown),

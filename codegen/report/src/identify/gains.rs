@@ -2,26 +2,18 @@
 
 use std::path::{Path, PathBuf};
 
-use host_sim::controller::{MachineWord, Supervised};
-use host_sim::record::{self, Block, Header};
 use serde::Serialize;
 
+use super::recorded_run::{records, replayed};
 use super::{MeasuredKeys, refused};
-use crate::replay;
-use specgen_compiler::compile::Compilation;
-use specgen_compiler::{lower, spec_file};
+use specgen_compiler::spec_file;
 use specgen_identify::gains::{self, LegGain};
-use specgen_identify::{declared, marked_as_simulated, write_table_csv};
-use specgen_language::model::RateDependence;
-use specgen_language::outcome::{Failure, Outcome, Refusal};
+use specgen_identify::{marked_as_simulated, write_table_csv};
+use specgen_language::outcome::{Failure, Outcome};
 use specgen_language::output::write_folder;
 use specgen_language::table::{right, row};
 use specgen_language::ui::Ui;
-use specgen_numerics::displacements;
-use specgen_studies::controllers;
 
-/// Supervisor phases in which the law moves the legs: running, holding.
-const MOVING: [u8; 2] = [2, 3];
 /// Largest acceptable standard error of λ.
 const LARGEST_ERROR: f64 = 0.02;
 /// Plausible λ; outside, the spec is wrong or a leg does not follow.
@@ -35,32 +27,12 @@ pub fn run(recording: &Path, spec: &Path, output: Option<&str>, ui: &mut Ui) -> 
     let shown = recording.display().to_string();
     let refuse = |error: &dyn std::fmt::Display| Failure::Gate(format!("{shown}: {error}"));
     let folder = output.map(|name| folder(spec, name)).transpose()?;
-    let mut reader = replay::open(recording)?;
     let compiled = spec_file::looked_up(spec, ui)?;
     let model = &compiled.model;
-    if model.task_space.is_none() {
-        return Err(refuse(&"six legs with their own gauges have one record each: use `specgen identify linear`"));
-    }
-    if matches!(model.hysteresis.rate, RateDependence::DynamicPreisach(_)) {
-        return Err(refuse(
-            &"the second weight of (6) has a separate gain: identify each leg with `specgen identify rate`",
-        ));
-    }
-    replay::same_build(recording, spec, &reader.header().description, &compiled)?;
-    let simulated = !compiled.assumptions.simulated.is_empty();
-    let dir = spec.parent().unwrap_or(Path::new(""));
-    let tables = declared::records(model, dir).map_err(refused)?;
+    let tables = records(model, spec, &refuse)?;
     tables.tables_only().map_err(|why| refuse(&why))?;
-
-    let mut machine = Supervised::new(controllers::at_run_time(&compiled, ui)?);
-    ui.progress("replaying the record");
-    let names = machine.output_names();
-    let mut moves = Moves::new(&compiled, &names)?;
-    let found = record::replay(&mut reader, &mut machine, |header, block, rows| moves.add(header, block, rows));
-    let found = found.map_err(|error| refuse(&error))?;
-    if let Some(message) = replay::verdict(&found) {
-        return Err(refuse(&message));
-    }
+    let moves = replayed(recording, spec, &compiled, ui)?;
+    let simulated = !compiled.assumptions.simulated.is_empty();
 
     let mut legs = Vec::new();
     for (leg, (voltage, displacement)) in moves.voltages.iter().zip(&moves.displacements).enumerate() {
@@ -118,64 +90,6 @@ fn folder(spec: &Path, name: &str) -> Result<PathBuf, Failure> {
 fn line(folder: &str) -> String {
     let names: Vec<String> = (1..=6).map(|leg| format!("\"{}/leg{leg}.csv\"", folder.trim_end_matches('/'))).collect();
     format!("records = [{}]", names.join(", "))
-}
-
-/// Motion of the legs while the law moved them.
-struct Moves {
-    platform: specgen_runtime::Platform<f64>,
-    voltage: usize,
-    pose: usize,
-    times: Vec<f64>,
-    voltages: [Vec<f64>; 6],
-    displacements: [Vec<f64>; 6],
-}
-
-impl Moves {
-    fn new(compiled: &Compilation, names: &[String]) -> Result<Self, Failure> {
-        let platform = lower::platform(&compiled.model)
-            .map_err(|findings| Refusal { source: Some(compiled.source.clone()), findings })?;
-        let place = |name: &str| {
-            let found = names.iter().position(|other| other == name);
-            found.ok_or_else(|| Failure::Environment(format!("the controller has no output {name}")))
-        };
-        let (voltage, pose) = (place("voltage[0]")?, place("pose[0]")?);
-        Ok(Self {
-            platform,
-            voltage,
-            pose,
-            times: Vec::new(),
-            voltages: Default::default(),
-            displacements: Default::default(),
-        })
-    }
-
-    /// Adds the rows of a block in which the law moves the legs. A row after a gap starts over, because the memory of the legs
-    /// is unknown there.
-    fn add(&mut self, header: &Header, block: &Block, rows: &[Vec<u64>]) {
-        let scalar = header.description.scalar;
-        for (row, given) in block.rows.iter().zip(rows) {
-            let machine = MachineWord::of(u64::from(row.supervisor));
-            if !machine.amplifier_on || !MOVING.contains(&machine.phase) {
-                continue;
-            }
-            let time = row.tick as f64 * header.period;
-            if self.times.last().is_some_and(|last| time > last + 1.5 * header.period) {
-                self.times.clear();
-                self.voltages.iter_mut().chain(&mut self.displacements).for_each(Vec::clear);
-            }
-            self.times.push(time);
-            let six = |first: usize| core::array::from_fn(|k| scalar.decode(given[first + k]));
-            let pose: [f64; 6] = six(self.pose);
-            let voltages: [f64; 6] = six(self.voltage);
-            self.voltages.iter_mut().zip(voltages).for_each(|(all, v)| all.push(v));
-            let moved = displacements(&self.platform, &pose);
-            self.displacements.iter_mut().zip(moved).for_each(|(all, d)| all.push(d));
-        }
-    }
-
-    fn seconds(&self) -> f64 {
-        self.times.first().zip(self.times.last()).map_or(0.0, |(first, last)| last - first)
-    }
 }
 
 /// Identified gains.

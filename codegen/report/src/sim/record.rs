@@ -29,10 +29,10 @@ use specgen_studies::machine;
 /// Number of blocks of the recorder, and words per block: a tenth of a second at 10 kHz.
 const BLOCKS: usize = 2;
 const BLOCK: usize = 1 << 15;
-/// Frequencies of the axes, Hz; none is a multiple of another.
+/// Frequencies of the axes over the lowest; none is a multiple of another.
 const FREQUENCIES: [f64; 6] = [1.0, 1.3, 1.7, 2.1, 2.3, 2.9];
-/// Amplitude of an axis relative to its free range: the third axis (z, or a leg), and the others. The legs share their stroke.
-const SHARES: [f64; 2] = [0.2, 0.03];
+/// Amplitude of an axis over that of the third, each relative to its free range. The legs share their stroke.
+const OTHERS: f64 = 0.15;
 /// Longest time to reach the bias pose, s.
 const ARMING: f64 = 60.0;
 
@@ -93,7 +93,13 @@ pub(super) fn run(
     let mut recorded = RecordedController::new(machine, &mut recorder, &mut writer).map_err(environment)?;
     recorded.reset();
     ui.progress(&format!("recording {seconds} s of a wave on all axes under the supervisor"));
-    let (wave, _) = wave(compiled, ticks as i32, FREQUENCIES, SHARES)?;
+    let lowest = match options.frequency.as_deref() {
+        None => 1.0,
+        Some([one]) => *one,
+        Some(_) => return Err(Failure::Usage("--record takes one --frequency, that of the slowest axis".to_owned())),
+    };
+    let shares = [options.amplitude, OTHERS * options.amplitude];
+    let (wave, _) = wave(compiled, ticks as i32, FREQUENCIES.map(|own| own * lowest), shares)?;
     let ran = match &compiled.model.task_space {
         Some(task) => platform(options, compiled, task, &mut recorded, wave, ticks as u64),
         None => legs(options, compiled, &mut recorded, wave, seconds),
