@@ -307,9 +307,14 @@ impl<'a> Signals<'a> {
         if fitted[2] {
             let mut others: Vec<&[f64]> = linear.columns.iter().map(Vec::as_slice).collect();
             let cubic = others.remove(at - 1);
-            let alone = fit(&others, cubic).map_or(0.0, |own| mean_square(&own.residual).sqrt());
-            let least = LIKENESS * rms / alone;
-            errors[2] = if errors[2] > least { errors[2] } else { least };
+            if let Some(own) = fit(&others, cubic) {
+                let least = LIKENESS * rms / mean_square(&own.residual).sqrt();
+                errors[2] = if errors[2] > least { errors[2] } else { least };
+                if fitted[0] {
+                    // What passes for a cubic term is taken from the gain.
+                    errors[0] = libm::hypot(errors[0], least * own.coefficients[0]);
+                }
+            }
         }
         let mut rest = linear.residual.iter();
         let residual = self.keep.iter().map(|keep| if *keep { rest.next().copied().unwrap_or(0.0) } else { 0.0 });
