@@ -81,6 +81,10 @@ impl Slot {
         let own = LINES.iter().find(|(command, _)| *command == self.command);
         let (_, usual) = own.unwrap_or_else(|| panic!("{}: add its line to LINES", self.command));
         let mut all: BTreeMap<&str, &str> = usual.iter().copied().collect();
+        // A recorded run has a spec in the place of drive and grid.
+        if self.name() == "specgen identify spec" {
+            all = BTreeMap::from([("record", "run.rec")]);
+        }
         all.extend(values.iter().copied());
         let mut words: Vec<String> = self.command.split(' ').skip(1).map(str::to_owned).collect();
         let mut positional: Vec<(usize, &str)> = Vec::new();

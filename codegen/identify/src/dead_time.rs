@@ -16,7 +16,6 @@ use super::prior;
 use super::record::Record;
 use super::regressor::Plane;
 use super::statistics::{extent, median, noise_floor};
-use super::turns;
 
 /// Least ratio of the fast to the slow branches (90 % and 10 % quantile of |du/dt|) for an estimate of the dead time.
 pub(crate) const RATE_RATIO: f64 = 2.0;
@@ -32,10 +31,6 @@ const SAMPLES: usize = 100_000;
 /// is zero.
 const WORTHWHILE: f64 = 0.1;
 const CERTAIN: f64 = 5.0;
-/// How the basis of an estimate from the turns begins.
-pub(crate) const AT_TURNS: &str = "estimated where the drive turns";
-/// Largest standard error of an estimate from the turns, s.
-const USEFUL: f64 = 5e-5;
 /// Loops are nested if half of the rises begin above this share of the drive's range.
 const NESTED: f64 = 0.05;
 
@@ -73,14 +68,6 @@ pub fn estimate(plane: &Plane, record: &Record, first: usize, branches: &[Branch
         return (0.0, format!("none: the best one lowers the residual by less than {:.0} %", WORTHWHILE * 100.0));
     }
     (found.dead_time, format!("estimated: lowers the residual of the branches by {:.0} %", gain * 100.0))
-}
-
-/// The same from the turns of the drive, if their standard error is small enough.
-pub(super) fn from_turns(plane: &Plane, record: &Record, first: usize, branches: &[Branch]) -> (f64, String) {
-    match turns::lag(record, branches) {
-        Some([lag, error]) if error < USEFUL => (lag, format!("{AT_TURNS}, standard error {:.3} ms", error * 1e3)),
-        _ => estimate(plane, record, first, branches),
-    }
 }
 
 /// The common duration of the branches (s) of a record that does not return to its lowest drive between its curves. Its

@@ -167,7 +167,7 @@ fn identify_checked(
     let mut used = selection::usable(record, &plane, findings)?;
     let (dead_time, dead_time_basis) = match options.dead_time {
         DeadTime::Estimate => dead_time::estimate(&plane, record, used.first, &used.branches),
-        DeadTime::FromTurns => dead_time::from_turns(&plane, record, used.first, &used.branches),
+        DeadTime::FromTurns => turns::estimate(&plane, record, used.first, &used.branches),
         DeadTime::Fixed(tau) => (if tau > 0.0 { tau } else { 0.0 }, "given".to_owned()),
     };
     used.until(dead_time::within(record, dead_time));

@@ -9,6 +9,7 @@ use super::branches::Branch;
 use super::dead_time;
 use super::least_squares;
 use super::record::Record;
+use super::regressor::Plane;
 
 /// Longest part of a branch beside a turn, s, and as a fraction of the branch.
 const WINDOW: f64 = 20e-3;
@@ -22,6 +23,19 @@ const DEGREE: usize = 3;
 /// Fewest turns.
 const TURNS: usize = 4;
 
+/// Largest standard error of an estimate from the turns, s.
+const USEFUL: f64 = 5e-5;
+/// How the basis of an estimate from the turns begins.
+pub(super) const AT_TURNS: &str = "estimated where the drive turns";
+
+/// The dead time as [`dead_time::estimate`] gives it, but from the turns of the drive if their standard error is small enough.
+pub(super) fn estimate(plane: &Plane, record: &Record, first: usize, branches: &[Branch]) -> (f64, String) {
+    match lag(record, branches) {
+        Some([lag, error]) if error < USEFUL => (lag, format!("{}, standard error {:.3} ms", AT_TURNS, error * 1e3)),
+        _ => dead_time::estimate(plane, record, first, branches),
+    }
+}
+
 /// A turn between two straight parts.
 struct Turn {
     /// Time (s) from the turn, and displacement, of each sample.
@@ -31,7 +45,7 @@ struct Turn {
 }
 
 /// The lag and its standard error, s; none if too few turns are sharp and sampled finely enough.
-pub(super) fn lag(record: &Record, branches: &[Branch]) -> Option<[f64; 2]> {
+fn lag(record: &Record, branches: &[Branch]) -> Option<[f64; 2]> {
     let turns: Vec<Turn> = branches.windows(2).filter_map(|pair| turn(record, [pair[0], pair[1]])).collect();
     if turns.len() < TURNS {
         return None;
@@ -122,11 +136,6 @@ mod tests {
             let phase = (t / half) % 2.0;
             let straight = if phase < 1.0 { phase } else { 2.0 - phase };
             let u = 100.0 * if triangle { straight } else { 0.5 - 0.5 * libm::cos(core::f64::consts::PI * phase) };
-            if k % every == 0 {
-                time.push(t);
-                drive.push(u);
-                displacement.push(1e-6 * (y + crept));
-            }
             let change = (u - late) * STEP / 3e-4;
             if (change > 0.0) != rising && change != 0.0 {
                 (turned, rising) = (late, change > 0.0);
@@ -135,6 +144,11 @@ mod tests {
             // Flat after a turn, then steeper.
             y += change * (0.5 + 0.3 * (1.0 - libm::exp(-(late - turned).abs() / 20.0)));
             crept += (0.05 * y - crept) * STEP / 0.1;
+            if k % every == 0 {
+                time.push(t);
+                drive.push(u);
+                displacement.push(1e-6 * (y + crept));
+            }
         }
         let weightless = vec![false; time.len()];
         let (shown_as, warnings) = (String::new(), Vec::new());

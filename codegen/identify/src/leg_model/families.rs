@@ -14,7 +14,7 @@ use crate::record::Record;
 use crate::regressor::{self, Plane};
 use crate::staircase::Staircase;
 use crate::statistics::{mean, mean_and_error};
-use crate::{DeadTime, Identification, dead_time, grid_choice, identify, prior, selection};
+use crate::{DeadTime, Identification, dead_time, grid_choice, identify, prior, selection, turns};
 use specgen_language::diagnostic::{Diagnostic, codes};
 use specgen_language::model::LegModelKind as Kind;
 
@@ -110,7 +110,7 @@ fn chosen(
     }
     // A lag that was found at the turns also cuts them off; any other dead time only shifts the displacement.
     let (mut late, mut delay) = (record.clone(), table.report.dead_time);
-    if table.report.dead_time_basis.starts_with(dead_time::AT_TURNS) {
+    if table.report.dead_time_basis.starts_with(turns::AT_TURNS) {
         late.drive = dead_time::lagged(record, delay);
         delay = 0.0;
     }

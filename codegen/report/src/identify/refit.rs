@@ -14,6 +14,7 @@ use specgen_compiler::spec_file;
 use specgen_identify::rate::RateModel;
 use specgen_identify::refit::{self, KNOWN, LegRefit, LegRun, Number, SPREAD};
 use specgen_identify::{marked_as_simulated, write_leg_csv};
+use specgen_language::files;
 use specgen_language::model::{Model, RateDependence};
 use specgen_language::outcome::{Failure, Outcome};
 use specgen_language::output::write_folder;
@@ -34,9 +35,7 @@ const ADVICE: &str = "record at least a second of a slow wave on all axes, in cl
 pub fn is_recorded_run(path: &Path) -> bool {
     use std::io::Read as _;
     let mut start = [0; FILE_MAGIC.len()];
-    path.is_file()
-        && std::fs::File::open(path).is_ok_and(|mut file| file.read_exact(&mut start).is_ok())
-        && start == FILE_MAGIC
+    files::open_file(path).is_ok_and(|mut file| file.read_exact(&mut start).is_ok()) && start == FILE_MAGIC
 }
 
 /// A leg of the spec, and what the run shows of it.
