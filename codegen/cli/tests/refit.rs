@@ -62,7 +62,7 @@ fn a_leg_that_lost_gain_is_named_and_no_other() {
             .says(0, &[]);
         folder.run(&["identify", "forc.csv", "--drive", "0:100", "--grid", "32", "-o", "table.csv"]).says(0, &[]);
         spec(&folder, "new.toml", "records = [\"table.csv\"]");
-        folder.run(&[&["sim", "new.toml", "--record", "run.rec", "--seconds", "2"][..], &plant].concat()).says(0, &[]);
+        folder.run(&[&["sim", "new.toml", "--record", "run.rec", "--seconds", "1.5"][..], &plant].concat()).says(0, &[]);
         let first = folder.run(&["identify", "run.rec", "--spec", "new.toml", "-o", "own"]);
         // A quarter of the stroke tells the gain, and not the cubic term.
         assert_eq!(first.code, 0, "{}", first.stderr);
