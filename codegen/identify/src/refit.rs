@@ -14,8 +14,8 @@
 //! λ is the mean gain over the motion of the run. What a usual c would add to it is stated.
 //!
 //! Standard errors are from fits without each of several blocks of the run (jackknife), not from its samples: residuals
-//! of a wrong model last. That of c is at least what a third of the residual would be as a cubic term. A number whose standard error exceeds a third of its spread keeps its old value, and the others
-//! are fitted without it.
+//! of a wrong model last. That of c is at least what a third of the residual would be as a cubic term. A number whose
+//! standard error exceeds a third of its spread keeps its old value, and the others are fitted without it.
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 use serde::Serialize;
