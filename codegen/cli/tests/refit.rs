@@ -62,7 +62,9 @@ fn a_leg_that_lost_gain_is_named_and_no_other() {
             .says(0, &[]);
         folder.run(&["identify", "forc.csv", "--drive", "0:100", "--grid", "32", "-o", "table.csv"]).says(0, &[]);
         spec(&folder, "new.toml", "records = [\"table.csv\"]");
-        folder.run(&[&["sim", "new.toml", "--record", "run.rec", "--seconds", "1.5"][..], &plant].concat()).says(0, &[]);
+        folder
+            .run(&[&["sim", "new.toml", "--record", "run.rec", "--seconds", "1.5"][..], &plant].concat())
+            .says(0, &[]);
         let first = folder.run(&["identify", "run.rec", "--spec", "new.toml", "-o", "own"]);
         // A quarter of the stroke tells the gain, and not the cubic term.
         assert_eq!(first.code, 0, "{}", first.stderr);
@@ -89,6 +91,7 @@ fn a_leg_that_lost_gain_is_named_and_no_other() {
 }
 
 #[test]
+#[ignore = "long: recorded runs of machines with and without latency; the gain of a leg is in the short run"]
 fn a_delay_of_the_machine_is_named_if_the_motion_is_fast_enough() {
     let folder = Folder::new();
     let fast = ["--frequency", "5"];
@@ -118,6 +121,19 @@ fn a_run_that_does_not_show_the_legs_is_refused_with_one_that_does() {
     let better: Vec<&str> = line.split(' ').skip(1).collect();
     folder.run(&better).says(0, &[]);
     folder.run(&["identify", "run.rec", "--spec", "reference.toml"]).says(0, &[]);
+    // Tables go to the folder of the spec, wherever the command runs.
+    std::fs::create_dir(folder.path("lab")).unwrap();
+    let mut beside = folder.command();
+    beside.current_dir(folder.path("lab"));
+    beside.args(["identify", "../run.rec", "--spec", "../reference.toml", "-o", "new"]);
+    let run = crate::support::Run::of(&mut beside);
+    assert!(run.code == 0 && run.stdout.contains("records = [\"lab/new/leg1.csv\""), "{run:#?}");
+    assert!(folder.path("lab/new/leg6.csv").is_file());
+    beside = folder.command();
+    beside.args(["identify", "run.rec", "--spec", "lab/other.toml", "-o", "new"]);
+    std::fs::copy(folder.path("reference.toml"), folder.path("lab/other.toml")).unwrap();
+    let run = crate::support::Run::of(&mut beside);
+    assert!(run.code == 2 && run.stderr.contains("expected a folder within that of the spec"), "{run:#?}");
 
     folder.run(&["sim", "reference.toml", "--record", "short.rec", "--seconds", "0.01"]).says(0, &[]);
     folder

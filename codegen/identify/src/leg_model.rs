@@ -166,6 +166,9 @@ impl Around {
         let of = |h: f64| gain * h + cubic * travel * (third(2.0 * h / travel - 1.0) + 1.0);
         let h = self.points();
         let moved: Vec<f64> = h.iter().map(|h| of(*h)).collect();
+        if moved.windows(2).any(|pair| pair[1] <= pair[0]) {
+            return Err(NOT_RISING.to_owned());
+        }
         let p: Vec<f64> = h.iter().map(|h| gain * self.read_out(*h)).collect();
         let (read_out, _) = through_zero(&moved, &p).ok_or_else(|| NOT_RISING.to_owned())?;
         let (slope, rest_um) = (gain * self.slope, gain * self.rest_um);

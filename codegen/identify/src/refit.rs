@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! y(t + τ) = λ p + c H T₃(s) + nuisance          s = 2 p/H − 1
-//! nuisance   1, t, e^(−10 t/D); T₂(s); what no other column explains of the voltage
+//! nuisance   1, t, e^(−10 t/D); T₂(s) if c is fitted; what no other column explains of the voltage
 //! ```
 //! p is the displacement of the model for the recorded voltages, H its stroke, D the duration of the run. The model
 //! takes the unknown state before the run from the run. λ is the gain of the fundamental over the full stroke, because
@@ -98,7 +98,7 @@ pub struct LegRefit {
     pub stroke: f64,
     /// Root mean square residual, m.
     pub residual_rms: f64,
-    /// The same with the old numbers, m.
+    /// With the old numbers; only an offset and a drift are removed, m.
     pub residual_before: f64,
 }
 

@@ -25,6 +25,8 @@ const TURNS: usize = 4;
 
 /// Largest standard error of an estimate from the turns, s.
 const USEFUL: f64 = 5e-5;
+/// Lag beside which the curvature is taken if there is none, s.
+const NEAR: f64 = 1e-5;
 /// How the basis of an estimate from the turns begins.
 pub(super) const AT_TURNS: &str = "estimated where the drive turns";
 
@@ -46,18 +48,23 @@ struct Turn {
 
 /// The lag and its standard error, s; none if too few turns are sharp and sampled finely enough.
 fn lag(record: &Record, branches: &[Branch]) -> Option<[f64; 2]> {
-    let turns: Vec<Turn> = branches.windows(2).filter_map(|pair| turn(record, [pair[0], pair[1]])).collect();
+    let longest = dead_time::longest(record, branches);
+    let turns = branches.windows(2).filter_map(|pair| turn(record, [pair[0], pair[1]]));
+    let turns: Vec<Turn> = turns.filter(|turn| turn.shows(longest)).collect();
     if turns.len() < TURNS {
         return None;
     }
     let squares = |lag: f64| turns.iter().try_fold(0.0, |sum, turn| Some(sum + turn.square(lag)?));
     let squares = |lags: &[f64]| lags.iter().map(|lag| squares(*lag)).collect::<Option<Vec<f64>>>();
-    let found = dead_time::search(dead_time::longest(record, branches), squares)?;
-    // Of the parabola around the least one.
-    let (lag, near) = (found.dead_time, 0.1 * found.dead_time);
-    let [below, least, above] = squares(&[lag - near, lag, lag + near])?[..] else { return None };
+    let found = dead_time::search(longest, squares)?;
+    // Of the parabola around the least one, or beside it if there is no lag.
+    let lag = found.dead_time;
+    let near = if lag > 0.0 { 0.1 * lag } else { NEAR };
+    let middle = if lag > 0.0 { lag } else { near };
+    let [below, at, above] = squares(&[middle - near, middle, middle + near])?[..] else { return None };
+    let least = if lag > 0.0 { at } else { below };
     let free = turns.iter().fold(0, |sum, turn| sum + turn.samples.len() - (2 * DEGREE + 1));
-    let variance = 2.0 * near * near * least / (free as f64 * (below - 2.0 * least + above));
+    let variance = 2.0 * near * near * least / (free as f64 * (below - 2.0 * at + above));
     (!found.at_end && variance > 0.0).then(|| [lag, variance.sqrt()])
 }
 
@@ -89,11 +96,24 @@ fn turn(record: &Record, [before, after]: [Branch; 2]) -> Option<Turn> {
 }
 
 impl Turn {
+    /// Time by which a drive behind this lag (s) turns late, s.
+    fn late(&self, lag: f64) -> f64 {
+        let [into, out] = self.slopes;
+        lag * libm::log(1.0 - into / out)
+    }
+
+    /// Whether there are enough samples on either side for every lag up to this one (s).
+    fn shows(&self, longest: f64) -> bool {
+        let late = self.late(longest);
+        let count = |of: &dyn Fn(f64) -> bool| self.samples.iter().filter(|[t, _]| of(*t)).count();
+        count(&|t| t < 0.0) >= SAMPLES && count(&|t| t >= late) >= SAMPLES
+    }
+
     /// Σ of squares that the polynomials leave with this lag (s).
     fn square(&self, lag: f64) -> Option<f64> {
         let [into, out] = self.slopes;
         // Time and distance by which the lagged drive turns late.
-        let late = lag * libm::log(1.0 - into / out);
+        let late = self.late(lag);
         let lagged = |t: f64| {
             let decay = |t: f64| if lag > 0.0 { libm::exp(-t / lag) } else { 0.0 };
             if t <= 0.0 { into * (t - lag) } else { out * (t - lag) - (into - out) * lag * decay(t) }
@@ -124,19 +144,24 @@ mod tests {
     use super::*;
     use crate::branches::branches;
 
-    /// Triangles of 100 V at 640 V/s, or sines of the same size, through a lag of 0.3 ms, hysteresis and creep.
-    fn record(triangle: bool, interval: f64) -> Record {
+    /// Triangles of 100 V at 640 V/s, or sines of the same size, through a lag (s), hysteresis and creep. One of 2 V
+    /// comes first.
+    fn record(triangle: bool, lag: f64, interval: f64) -> Record {
         const STEP: f64 = 1e-5;
+        const SMALL: usize = 625;
+        let begun = SMALL as f64 * STEP;
         let half = 100.0 / 640.0;
         let (mut late, mut turned, mut rising, mut y, mut crept) = (0.0, 0.0, true, 0.0, 0.0);
         let every = (interval / STEP).round() as usize;
         let (mut time, mut drive, mut displacement) = (Vec::new(), Vec::new(), Vec::new());
-        for k in 0..200_000 {
+        for k in 0..400_000 {
             let t = k as f64 * STEP;
-            let phase = (t / half) % 2.0;
+            // A loop of 2 V, 3.1 ms a branch, whose turns are not shown at a lag of some ms.
+            let (size, phase) =
+                if k < SMALL { (2.0, t * 640.0 / 2.0 % 2.0) } else { (100.0, (t - begun) / half % 2.0) };
             let straight = if phase < 1.0 { phase } else { 2.0 - phase };
-            let u = 100.0 * if triangle { straight } else { 0.5 - 0.5 * libm::cos(core::f64::consts::PI * phase) };
-            let change = (u - late) * STEP / 3e-4;
+            let u = size * if triangle { straight } else { 0.5 - 0.5 * libm::cos(core::f64::consts::PI * phase) };
+            let change = if lag > 0.0 { (u - late) * STEP / lag } else { u - late };
             if (change > 0.0) != rising && change != 0.0 {
                 (turned, rising) = (late, change > 0.0);
             }
@@ -158,11 +183,14 @@ mod tests {
     #[test]
     fn the_lag_of_sharp_turns_is_found_in_spite_of_creep_and_others_are_left_out() {
         let found = |record: &Record| lag(record, &branches(&record.drive, 0, 1.0));
-        let [at, error] = found(&record(true, 5e-4)).unwrap();
+        let [at, error] = found(&record(true, 3e-4, 5e-4)).unwrap();
         println!("{:.4} ms, standard error {:.4} ms", at * 1e3, error * 1e3);
         assert!((at - 3e-4).abs() < 1e-5 && error < 1e-5);
-        assert!(found(&record(true, 5e-3)).is_none() && found(&record(false, 5e-4)).is_none());
-        let mut spoilt = record(true, 5e-4);
+        assert!(found(&record(true, 3e-4, 5e-3)).is_none() && found(&record(false, 3e-4, 5e-4)).is_none());
+        assert!(found(&record(true, 0.0, 5e-4)).unwrap()[0] < 1e-5);
+        // The turns of the small loop have enough samples here, but not behind a lag of 8 ms.
+        assert!((found(&record(true, 3e-4, 2e-4)).unwrap()[0] - 3e-4).abs() < 1e-5);
+        let mut spoilt = record(true, 3e-4, 5e-4);
         for k in (100..4000).step_by(250) {
             spoilt.displacement[k] += 3e-6;
             spoilt.weightless[k] = true;

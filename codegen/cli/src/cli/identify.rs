@@ -8,6 +8,7 @@ use specgen_identify::mode::Mode;
 use specgen_identify::{DeadTime, Reading};
 use specgen_language::model::LegModelKind;
 use specgen_language::outcome::Failure;
+use specgen_language::output::check_place;
 use specgen_language::ui::Ui;
 use specgen_report::identify::{Bench, estimates, everett, gains, linear, predict, rate, refit};
 
@@ -325,6 +326,8 @@ fn record(arguments: &EverettArguments, ui: &mut Ui) -> Result<(), Failure> {
             record.display()
         ));
     }
+    // A folder in its place is for a recorded run only.
+    output.as_deref().map_or(Ok(()), check_place)?;
     let Some(drive) = drive else { return usage("expected the voltage range of the table, --drive MIN:MAX in V") };
     let dead_time = dead_time.map_or(DeadTime::Estimate, |ms| DeadTime::Fixed(ms * 1e-3));
     let options = everett::Options { drive: *drive, grid: *grid, dead_time, model: *model };

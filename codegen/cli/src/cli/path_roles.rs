@@ -13,7 +13,7 @@ use specgen_language::files::{self, Destination, OutputError};
 use specgen_language::outcome::Failure;
 use specgen_language::output::refused_output;
 
-macro_rules! named {
+macro_rules! path_types {
     ($($(#[$doc:meta])* $name:ident)*) => {$(
         $(#[$doc])*
         #[derive(Debug, Clone, PartialEq, Eq)]
@@ -53,7 +53,7 @@ macro_rules! named {
     )*};
 }
 
-named! {
+path_types! {
     /// A file that the command reads.
     InputFile
     /// A file that the command writes.

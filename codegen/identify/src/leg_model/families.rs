@@ -96,7 +96,7 @@ fn chosen(
     let (slow, fast) = dead_time::rates(record, &used.branches);
     if fast < dead_time::RATE_RATIO * slow {
         let message = format!("one rate ({slow:.0} to {fast:.0} V/s): creep and rate dependence look alike");
-        let help = "append some curves at a much higher rate, with at least 8 samples in 20 ms, whose turns show the dead time";
+        let help = "append some curves at a much higher rate; with at least 8 samples in 20 ms, their turns also show the dead time";
         findings.add(codes::CREEP_FROM_ONE_RATE, None, message, help);
     }
     let (fold_of, folds, levels) = grid_choice::deal(record, &used.branches, options.drive);
@@ -109,12 +109,10 @@ fn chosen(
         return findings.refuse(codes::GRID_NOT_CHOSEN, None, message, help);
     }
     // A lag that was found at the turns also cuts them off; any other dead time only shifts the displacement.
-    let (mut late, mut delay) = (record.clone(), table.report.dead_time);
-    if table.report.dead_time_basis.starts_with(turns::AT_TURNS) {
-        late.drive = dead_time::lagged(record, delay);
-        delay = 0.0;
-    }
-    let data = Data::new(&late, &plane, &used, &fold_of, delay);
+    let delay = table.report.dead_time;
+    let turned = delay > 0.0 && table.report.dead_time_basis.starts_with(turns::AT_TURNS);
+    let late = turned.then(|| Record { drive: dead_time::lagged(record, delay), ..record.clone() });
+    let data = Data::new(late.as_ref().unwrap_or(record), &plane, &used, &fold_of, if turned { 0.0 } else { delay });
     let mut candidates: Vec<Candidate> = Vec::new();
     for family in Family::all().into_iter().filter(|family| kind == Kind::Auto || family.kind == kind) {
         candidates.extend(data.candidate(family, folds));

@@ -129,6 +129,9 @@ fn implausible(leg: usize, found: &LegRefit, spec: &Path) -> String {
 
 /// Why no number is accepted.
 fn too_little(legs: &[Leg], spec: &Path) -> String {
+    if legs.is_empty() {
+        return "the spec has no table of a leg to refit".to_owned();
+    }
     let moved = legs.iter().filter_map(|(_, found)| found.as_ref());
     let most = moved.reduce(|a, b| if b.travel > a.travel { b } else { a });
     let travels = most.map_or(String::new(), |leg| {
@@ -142,12 +145,18 @@ fn advice(spec: &Path) -> String {
     ADVICE.replace("SPEC", &spec.display().to_string())
 }
 
-/// The name of `folder` relative to the folder of the spec.
+/// The name of `folder`, which is relative to the current folder, relative to that of the spec.
 fn within(spec: &Path, folder: &Path) -> Result<String, Failure> {
-    let dir = spec.parent().unwrap_or(Path::new(""));
-    let relative = folder.strip_prefix(dir).unwrap_or(folder);
-    let plain = relative.components().all(|part| matches!(part, std::path::Component::Normal(_)));
-    let text = relative.to_str().filter(|text| plain && !text.is_empty() && !text.contains('\\'));
+    let dir = spec.parent().filter(|dir| !dir.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let whole = std::path::absolute(folder).unwrap_or_default();
+    // The folder itself may be new.
+    let parent = whole.parent().and_then(|parent| parent.canonicalize().ok());
+    let whole = parent.zip(whole.file_name()).map_or(whole.clone(), |(parent, name)| parent.join(name));
+    let dir = dir.canonicalize().unwrap_or_default();
+    let relative = whole.strip_prefix(dir).ok();
+    let plain = |path: &Path| path.components().all(|part| matches!(part, std::path::Component::Normal(_)));
+    let text = relative.filter(|path| plain(path)).and_then(Path::to_str);
+    let text = text.filter(|text| !text.is_empty() && !text.contains('\\'));
     text.map(|text| text.trim_end_matches('/').to_owned()).ok_or_else(|| {
         let expected = "expected a folder within that of the spec, such as `gains`, with forward slashes";
         Failure::Usage(format!("-o `{}`: {expected}", folder.display()))
@@ -164,7 +173,8 @@ fn records_lines(model: &Model, folder: &str, shaped: bool) -> String {
     format!("[hysteresis]\nrecords = [{}]\n{creep}", names.join(", "))
 }
 
-/// The spec line with the mean delay of the legs that show one, if it differs; `old` is the lead now, s.
+/// The spec line with the mean delay of the legs that show one, if it differs; `old` is the lead now, s. A lead is at least
+/// 0: legs that are even faster are named again by the same run.
 fn lead_line(legs: &[Leg], old: f64) -> Option<String> {
     let known: Vec<LegRefit> =
         legs.iter().filter_map(|(_, found)| *found).filter(|found| found.delay.accepted).collect();
@@ -233,9 +243,19 @@ impl Refits {
                 continue;
             }
             let most = |of: &dyn Fn(&LegRefit) -> f64| {
-                legs.iter().filter_map(|(_, found)| *found).map(of).fold(0.0, |a, b| if b > a { b } else { a })
+                self.legs.iter().flatten().map(of).fold(0.0, |a, b| if b > a { b } else { a })
             };
-            let worst = Number { error: most(&|found| found.numbers()[k].error), change: 0.0, accepted: false };
+            let of_leg = |found: &Option<&LegRefit>| found.map_or(f64::INFINITY, |found| found.numbers()[k].error);
+            let worst = legs.iter().map(|(_, found)| of_leg(found)).fold(0.0, |a, b| if b > a { b } else { a });
+            let known = if worst < 1e3 * size {
+                format!(
+                    "standard error up to {:.digits$}{unit}, {:.digits$}{unit} required",
+                    worst * size,
+                    KNOWN * SPREAD[k] * size
+                )
+            } else {
+                "this run does not show it at all".to_owned()
+            };
             let fix = match k {
                 0 => {
                     format!("A motion over a quarter of the stroke, {:.1} um, shows it.", most(&LegRefit::enough) * 1e6)
@@ -249,13 +269,10 @@ impl Refits {
                 ),
             };
             let numbers: Vec<String> = legs.iter().map(|(leg, _)| leg.to_string()).collect();
-            let limit = KNOWN * SPREAD[k] * size;
             let _ = writeln!(
                 text,
-                "{name} of leg {}: not determined by this run, kept (standard error up to {}{unit}, {limit:.digits$}{unit} \
-                 required). {fix}",
+                "{name} of leg {}: not determined by this run, kept ({known}). {fix}",
                 numbers.join(", "),
-                error(&worst, size, digits),
             );
         }
         text

@@ -75,6 +75,11 @@ pub(super) fn run(
             "--seconds {seconds} gives {ticks} ticks of {period} s; expected 1 to 10^9 ticks"
         )));
     }
+    let lowest = match options.frequency.as_deref() {
+        None => 1.0,
+        Some([one]) => *one,
+        Some(_) => return Err(Failure::Usage("--record takes one --frequency, that of the slowest axis".to_owned())),
+    };
     let text = controller.text().to_owned();
     let machine = Supervised::new(controller);
     let layout = Layout {
@@ -93,11 +98,6 @@ pub(super) fn run(
     let mut recorded = RecordedController::new(machine, &mut recorder, &mut writer).map_err(environment)?;
     recorded.reset();
     ui.progress(&format!("recording {seconds} s of a wave on all axes under the supervisor"));
-    let lowest = match options.frequency.as_deref() {
-        None => 1.0,
-        Some([one]) => *one,
-        Some(_) => return Err(Failure::Usage("--record takes one --frequency, that of the slowest axis".to_owned())),
-    };
     let shares = [options.amplitude, OTHERS * options.amplitude];
     let (wave, _) = wave(compiled, ticks as i32, FREQUENCIES.map(|own| own * lowest), shares)?;
     let ran = match &compiled.model.task_space {

@@ -246,7 +246,7 @@ pub fn learn(
             break;
         }
         match progress.advance(machine) {
-            // The machine does not respond: return what was learned so far.
+            // The pass was ended: return what was learned so far.
             Err(LearnError::Interruption) => return Ok(LearningResult { ending: Ending::Machine, ..result }),
             advanced => advanced?,
         }
