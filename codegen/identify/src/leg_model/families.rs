@@ -96,7 +96,7 @@ fn chosen(
     let (slow, fast) = dead_time::rates(record, &used.branches);
     if fast < dead_time::RATE_RATIO * slow {
         let message = format!("one rate ({slow:.0} to {fast:.0} V/s): creep and rate dependence look alike");
-        let help = "append some curves at a much higher rate; with at least 8 samples in 20 ms, their turns also show the dead time";
+        let help = "append curves at a much higher rate, all sampled at one rate of at least 1 kHz: their turns also show the dead time";
         findings.add(codes::CREEP_FROM_ONE_RATE, None, message, help);
     }
     let (fold_of, folds, levels) = grid_choice::deal(record, &used.branches, options.drive);
