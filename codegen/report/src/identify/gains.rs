@@ -10,7 +10,7 @@ use specgen_compiler::spec_file;
 use specgen_identify::gains::{self, LegGain};
 use specgen_identify::{marked_as_simulated, write_table_csv};
 use specgen_language::outcome::{Failure, Outcome};
-use specgen_language::output::write_folder;
+use specgen_language::output::{check_input, write_folder};
 use specgen_language::table::{right, row};
 use specgen_language::ui::Ui;
 
@@ -27,6 +27,7 @@ pub fn run(recording: &Path, spec: &Path, output: Option<&str>, ui: &mut Ui) -> 
     let shown = recording.display().to_string();
     let refuse = |error: &dyn std::fmt::Display| Failure::Gate(format!("{shown}: {error}"));
     let folder = output.map(|name| folder(spec, name)).transpose()?;
+    check_input(recording)?;
     let compiled = spec_file::looked_up(spec, ui)?;
     let model = &compiled.model;
     let tables = records(model, spec, &refuse)?;

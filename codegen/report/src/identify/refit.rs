@@ -17,7 +17,7 @@ use specgen_identify::{marked_as_simulated, write_leg_csv};
 use specgen_language::files;
 use specgen_language::model::{Model, RateDependence};
 use specgen_language::outcome::{Failure, Outcome};
-use specgen_language::output::write_folder;
+use specgen_language::output::{check_input, write_folder};
 use specgen_language::table::{right, row};
 use specgen_language::ui::Ui;
 
@@ -49,6 +49,7 @@ pub fn run(recording: &Path, spec: &Path, output: Option<&Path>, ui: &mut Ui) ->
     let shown = recording.display().to_string();
     let refuse = |error: &dyn std::fmt::Display| Failure::Gate(format!("{shown}: {error}"));
     let folder = output.map(|folder| within(spec, folder).map(|name| (name, folder))).transpose()?;
+    check_input(recording)?;
     let compiled = spec_file::looked_up(spec, ui)?;
     let tables = records(&compiled.model, spec, &refuse)?;
     let moves = replayed(recording, spec, &compiled, ui)?;
