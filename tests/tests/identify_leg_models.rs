@@ -11,7 +11,7 @@ use specgen::identify::leg_model::{Choice, choose};
 use specgen::identify::rate::RateModel;
 use specgen::identify::{Drive, Options, Record, parse_record, predict};
 use specgen::model::LegModelKind as Kind;
-use specgen_tests::length;
+use specgen_tests::{leg_class, length};
 
 use crate::platform_tables::bench::{in_parallel, two_rates};
 
@@ -66,11 +66,7 @@ fn the_family_of_a_leg_is_found_in_its_reversal_curves() {
 fn drawn(class: u32, number: u32) -> LegParameters {
     let mut random = ChaCha8Rng::seed_from_u64(u64::from(1000 * class + number));
     let mut factor = || 0.7 + 0.6 * unit(&mut random);
-    let mut leg = if class == 1 { LegParameters::bouc_wen() } else { LegParameters::reference() };
-    if class == 2 {
-        let LegParameters { creep_rates_per_s, creep_weights, creep_thresholds_v, .. } = LegParameters::bouc_wen();
-        leg = LegParameters { kappa: 0.02, creep_rates_per_s, creep_weights, creep_thresholds_v, ..leg };
-    }
+    let mut leg = leg_class(class.into());
     leg.gain_um_per_v *= factor();
     leg.s2 *= factor();
     leg.kappa *= if number % 3 == 1 { 0.0 } else { factor() };
@@ -103,17 +99,6 @@ fn random_legs_of_three_classes_get_a_family_of_their_class() {
         // 95 % are asked for; two of thirty Bouc-Wen legs get plays beside the state.
         let least = if class == 1 { 93 } else { 95 };
         assert!(100 * right >= least * legs as usize, "class {class}: {names:?}");
-    }
-}
-
-/// A leg as built of each class, see [`drawn`].
-fn built(class: u32) -> LegParameters {
-    let LegParameters { creep_rates_per_s, creep_weights, creep_thresholds_v, .. } = LegParameters::bouc_wen();
-    let (plays, kappa) = (LegParameters::reference(), 0.02);
-    match class {
-        0 => plays,
-        1 => LegParameters::bouc_wen(),
-        _ => LegParameters { kappa, creep_rates_per_s, creep_weights, creep_thresholds_v, ..plays },
     }
 }
 
@@ -156,7 +141,7 @@ fn open_loop(choice: &Choice, leg: &LegParameters) -> [f64; 2] {
 #[ignore = "long: every family fitted to two records of a leg of each class"]
 fn two_rates_give_a_better_leg_model_than_one() {
     let found = in_parallel(6, |number| {
-        let (class, leg) = (number / 2, built(number / 2));
+        let (class, leg) = (number / 2, leg_class(u64::from(number / 2)));
         let record = if number % 2 == 0 {
             record(&leg, 1)
         } else {

@@ -95,8 +95,8 @@ impl Bench {
     }
 
     /// A command for the loop, which takes it after this tick.
-    pub fn queue(&mut self, order: LoopCommand) {
-        self.outer.commands.push(order).expect("room for an order");
+    pub fn queue(&mut self, command: LoopCommand) {
+        self.outer.commands.push(command).expect("room for a command");
     }
 
     pub fn ask(&mut self, request: Request) {

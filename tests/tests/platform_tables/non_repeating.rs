@@ -7,7 +7,7 @@ use host_sim::platform::{PlatformParameters, Specimen};
 use host_sim::trajectory::{PoseTarget, PoseTrajectory};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
-use specgen_tests::{damped, length, skipped};
+use specgen_tests::{damped, leg_class, length, skipped};
 
 use super::bench::{Bench, in_parallel, two_rates};
 
@@ -94,17 +94,6 @@ fn errors(bench: &Bench) -> [f64; 3] {
         .map(|path| scenario.run(&mut controller, &path).unwrap().errors.rms_translation_nm())
 }
 
-/// The leg of a class: 0 plays with thresholded creep, 1 Bouc-Wen, 2 plays that widen with rate; 1 and 2 with logarithmic creep.
-fn leg(class: u32) -> LegParameters {
-    let LegParameters { creep_rates_per_s, creep_weights, creep_thresholds_v, .. } = LegParameters::bouc_wen();
-    let (plays, kappa) = (LegParameters::reference(), 0.02);
-    match class {
-        0 => plays,
-        1 => LegParameters::bouc_wen(),
-        _ => LegParameters { kappa, creep_rates_per_s, creep_weights, creep_thresholds_v, ..plays },
-    }
-}
-
 fn bench(name: &str, leg: &LegParameters, model: &str) -> Bench {
     let legs = Specimen::within_tolerances(&PlatformParameters::reference(), leg, 1);
     let model = format!("memory  = 64\nmodel   = \"{model}\"");
@@ -120,7 +109,7 @@ fn shown(what: &str, errors: [f64; 3]) -> [f64; 3] {
 #[test]
 #[ignore = "long: every family fitted, and two controllers; the short run compares the bits of the chosen model"]
 fn a_bouc_wen_leg_with_the_model_of_its_own_curves_follows_what_does_not_repeat() {
-    let leg = leg(1);
+    let leg = leg_class(1);
     let modelled = shown("Bouc-Wen, auto", errors(&bench("bouc-auto", &leg, "auto")));
     let bars = [6.0, 6.0, 8.0];
     assert!(modelled.iter().zip(bars).all(|(error, bar)| *error <= bar), "{modelled:?}");
@@ -134,7 +123,7 @@ fn a_bouc_wen_leg_with_the_model_of_its_own_curves_follows_what_does_not_repeat(
 #[test]
 #[ignore = "long: every family fitted to twelve records, and four controllers"]
 fn plays_follow_what_does_not_repeat_no_worse_with_a_chosen_model_than_with_the_table() {
-    for (name, leg) in [("plays", leg(0)), ("rate-widened plays", leg(2))] {
+    for (name, leg) in [("plays", leg_class(0)), ("rate-widened plays", leg_class(2))] {
         let [modelled, table] = ["auto", "preisach"]
             .map(|model| shown(&format!("{name}, {model}"), errors(&bench(&format!("{name}-{model}"), &leg, model))));
         assert!(modelled.iter().zip(table).all(|(model, table)| *model < 1.05 * table), "{modelled:?} {table:?}");
@@ -143,7 +132,7 @@ fn plays_follow_what_does_not_repeat_no_worse_with_a_chosen_model_than_with_the_
 
 /// A controller with the leg model that is chosen from curves at two rates; `grid` of the spec, none by default.
 fn chosen(class: u32, grid: Option<usize>) -> Bench {
-    let legs = Specimen::within_tolerances(&PlatformParameters::reference(), &leg(class), 1);
+    let legs = Specimen::within_tolerances(&PlatformParameters::reference(), &leg_class(class.into()), 1);
     let records = two_rates(&legs.legs);
     let grid = grid.map_or(String::new(), |grid| format!("grid = {grid}\n"));
     let hysteresis = format!("{grid}memory  = 64\nmodel   = \"auto\"");

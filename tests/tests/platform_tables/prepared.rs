@@ -1,9 +1,8 @@
 //! Steps and a path prepared by the leg model of a spec, hysteresis included, on machines of three classes of legs. The model is
 //! chosen from noisy reversal curves of each leg; the machine is the plant that gave them. All of it is simulation.
 
-use host_sim::plant::LegParameters;
 use host_sim::platform::{PlatformParameters, Specimen};
-use specgen_tests::length;
+use specgen_tests::{leg_class, length};
 
 use super::bench::Bench;
 use super::learning::{STEPS, case_1_errors, learning, settled};
@@ -15,14 +14,7 @@ const CLASSES: [(&str, f64); 3] = [("plays", 14.0), ("Bouc-Wen", 15.0), ("rate-w
 
 /// A machine of legs of a class, and a damped controller with the model of their own records.
 fn bench(class: usize) -> Bench {
-    let plays = LegParameters::reference();
-    let LegParameters { creep_rates_per_s, creep_weights, creep_thresholds_v, .. } = LegParameters::bouc_wen();
-    let leg = match class {
-        0 => plays,
-        1 => LegParameters::bouc_wen(),
-        _ => LegParameters { kappa: 0.02, creep_rates_per_s, creep_weights, creep_thresholds_v, ..plays },
-    };
-    let legs = Specimen::within_tolerances(&PlatformParameters::reference(), &leg, 1);
+    let legs = Specimen::within_tolerances(&PlatformParameters::reference(), &leg_class(class as u64), 1);
     let model = ("memory  = 64", "memory  = 64\nmodel   = \"auto\"");
     Bench::new(&format!("prepared-{class}"), legs, &[&learning()[..], &[model]].concat())
 }
