@@ -3,10 +3,14 @@
 //! From 0 V, for k = 1..=N: a ramp up to k·u_max/N and back to 0, all at one speed and without a pause. N = 32 at 20
 //! V/s takes 165 s, N = 16 takes 85 s.
 
+mod random;
+
 use std::fmt::Write;
 
 use crate::noise::Gauge;
 use crate::plant::{LegPlant, steps_within};
+
+pub use random::RandomDrive;
 
 /// The comment that marks a record as simulated. `specgen_identify::SIMULATED` is equal; a test compares them.
 pub const SIMULATED: &str = "# simulated by specgen: no leg was measured";
@@ -53,16 +57,23 @@ impl ReversalExperiment {
     #[must_use]
     pub fn drive(&self, lowest: f64, rest: f64) -> Vec<f64> {
         let levels = self.intervals * self.rows_per_interval;
-        let step = self.drive_max / f64::from(levels);
-        let approach = (lowest.abs() / step).ceil();
-        let resting = (rest * self.rate / step).ceil();
-        let mut drive: Vec<f64> = (0..approach as u32).map(|k| lowest * f64::from(k) / approach).collect();
-        drive.extend(std::iter::repeat_n(lowest, resting as usize + 1));
+        let mut drive = self.lead_in(lowest, rest);
         for curve in 1..=self.intervals {
             let peak = curve * self.rows_per_interval;
             let at = |level: u32| lowest + f64::from(level) * self.drive_max / f64::from(levels);
             drive.extend((1..=peak).chain((0..peak).rev()).map(at));
         }
+        drive
+    }
+
+    /// The drive before the curves: from 0 V to `lowest` (V) and `rest` (s) there, at least one row.
+    #[must_use]
+    pub fn lead_in(&self, lowest: f64, rest: f64) -> Vec<f64> {
+        let step = self.drive_max / f64::from(self.intervals * self.rows_per_interval);
+        let approach = (lowest.abs() / step).ceil();
+        let resting = (rest * self.rate / step).ceil();
+        let mut drive: Vec<f64> = (0..approach as u32).map(|k| lowest * f64::from(k) / approach).collect();
+        drive.extend(std::iter::repeat_n(lowest, resting as usize + 1));
         drive
     }
 

@@ -9,11 +9,11 @@ use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
 use specgen::identify::leg_model::{Choice, choose};
 use specgen::identify::rate::RateModel;
-use specgen::identify::{Drive, Options, Record, parse_record, predict};
+use specgen::identify::{Drive, Options, Record, join, parse_record, predict};
 use specgen::model::LegModelKind as Kind;
 use specgen_tests::{leg_class, length};
 
-use crate::platform_tables::bench::{in_parallel, two_rates};
+use crate::platform_tables::bench::{VOLTAGE, in_parallel, three_records};
 
 /// Reversal curves of a leg as built, with the gauge's noise.
 fn record(leg: &LegParameters, seed: u64) -> Record {
@@ -25,7 +25,7 @@ fn record(leg: &LegParameters, seed: u64) -> Record {
 fn chosen(leg: &LegParameters, seed: u64) -> Choice {
     let record = record(leg, seed);
     let start = Instant::now();
-    let choice = choose(&record, &Options::new(32, [0.0, 100.0]), Kind::Auto).unwrap();
+    let choice = choose(&record, None, &Options::new(32, VOLTAGE), Kind::Auto).unwrap();
     for score in &choice.scores {
         let error = [score.held_out_rms, score.standard_error].map(|error| error * 1e9);
         println!("{}: {:.2} ± {:.2} nm", score.family.name(), error[0], error[1]);
@@ -138,21 +138,20 @@ fn open_loop(choice: &Choice, leg: &LegParameters) -> [f64; 2] {
 }
 
 #[test]
-#[ignore = "long: every family fitted to two records of a leg of each class"]
+#[ignore = "long: every family fitted three times to a leg of each class"]
 fn two_rates_give_a_better_leg_model_than_one() {
-    let found = in_parallel(6, |number| {
-        let (class, leg) = (number / 2, leg_class(u64::from(number / 2)));
-        let record = if number % 2 == 0 {
-            record(&leg, 1)
-        } else {
-            let legs = std::array::from_fn(|_| leg.clone());
-            parse_record(&two_rates(&legs)[0], "leg.csv").unwrap()
-        };
-        let choice = choose(&record, &Options::new(32, [0.0, 100.0]), Kind::Auto).unwrap();
+    let found = in_parallel(9, |number| {
+        let (class, records) = (number / 3, ["one rate", "two rates", "two rates and an arbitrary record"]);
+        let leg = leg_class(u64::from(class));
+        let [slow, fast, arbitrary] = three_records(&leg, 0);
+        let record = if number % 3 == 0 { slow } else { join(&[slow, fast], VOLTAGE).unwrap() };
+        let other = (number % 3 == 2).then_some(&arbitrary);
+        let choice = choose(&record, other, &Options::new(32, VOLTAGE), Kind::Auto).unwrap();
         let report = &choice.table.report;
         let errors = open_loop(&choice, &leg);
         println!(
-            "class {class}: {:.1} nm, above 8 Hz {:.1} nm; {}, dead time {:.3} ms ({}), creep {:?}",
+            "class {class}, {}: {:.1} nm, above 8 Hz {:.1} nm; {}, dead time {:.3} ms ({}), creep {:?}",
+            records[number as usize % 3],
             errors[0],
             errors[1],
             choice.family.name(),
@@ -162,10 +161,12 @@ fn two_rates_give_a_better_leg_model_than_one() {
         );
         (report.dead_time, errors)
     });
-    for (class, pair) in found.chunks(2).enumerate() {
-        let (one, (dead_time, two)) = (pair[0].1, pair[1]);
-        // Amplifier and mode are 0.36 ms late; a record at 20 V/s with a sample each 20 ms cannot show it.
-        assert!((0.28e-3..0.42e-3).contains(&dead_time), "class {class}: {dead_time}");
-        assert!(two[0] < one[0] && two[1] < one[1], "class {class}: {two:?} nm from two rates, {one:?} from one");
+    for (class, three) in found.chunks(3).enumerate() {
+        let one = three[0].1;
+        for (dead_time, two) in &three[1..] {
+            // Amplifier and mode are 0.36 ms late; a record at 20 V/s with a sample each 20 ms cannot show it.
+            assert!((0.28e-3..0.42e-3).contains(dead_time), "class {class}: {dead_time}");
+            assert!(two[0] < one[0] && two[1] < one[1], "class {class}: {two:?} nm from two rates, {one:?} from one");
+        }
     }
 }

@@ -282,6 +282,36 @@ fn a_simulated_record_can_be_identified() {
 }
 
 #[test]
+fn records_at_two_rates_are_written_and_identified_together() {
+    let folder = Folder::new();
+    let forc = folder.json(&["forc", "-o", "leg.csv", "--grid", "8", "--two-rates"]);
+    let further = forc.value["result"]["further"].as_array().unwrap();
+    let files: Vec<&serde_json::Value> = further.iter().map(|one| &one["file"]).collect();
+    assert_eq!(files, ["leg-fast.csv", "leg-arbitrary.csv"]);
+    let last = folder.read("leg-fast.csv").lines().last().unwrap().to_owned();
+    // 500 V at 640 V/s, less what makes whole rows of 0.1 ms.
+    assert!(last.starts_with("0.782,0,"), "{last}");
+    let both = ["identify", "leg.csv", "leg-fast.csv", "--drive", "0:100", "--grid", "8", "--model", "auto"];
+    let document = folder.json(&[&both[..], &["--validate", "leg-arbitrary.csv"]].concat());
+    let codes: Vec<String> = document.findings().iter().map(|finding| finding["code"].to_string()).collect();
+    assert!(document.code == 0 && codes.is_empty(), "{codes:?}");
+    let result = &document.value["result"];
+    assert_eq!(result["report"]["reversal_curves"], 12);
+    assert!(result["scores"][0]["arbitrary_rms"].as_f64().is_some_and(|rms| rms > 0.0), "{result}");
+    assert_eq!(result["validation"]["record"], "leg-arbitrary.csv");
+    // Drives for a generator: each rests at the lowest voltage, and returns to it.
+    let drive = ["forc", "-o", "drive.csv", "--drive-only", "--drive", "-90:90", "--sampling", "2000", "--grid", "4"];
+    assert_eq!(folder.run(&[&drive[..], &["--two-rates"]].concat()).code, 0);
+    for name in ["drive.csv", "drive-fast.csv", "drive-arbitrary.csv"] {
+        let text = folder.read(name);
+        let drive: Vec<f64> =
+            text.lines().skip(1).map(|line| line.split_once(',').unwrap().1.parse().unwrap()).collect();
+        let resting = drive.iter().skip_while(|u| **u > -90.0).take_while(|u| **u == -90.0).count();
+        assert!(resting >= 2000 && drive[0] == 0.0 && drive.last() == Some(&-90.0), "{name}: {resting}");
+    }
+}
+
+#[test]
 fn a_spec_that_is_no_spec_is_refused_with_its_name_and_a_fix() {
     let folder = Folder::new();
     folder.write("empty.toml", "");

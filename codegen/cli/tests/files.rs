@@ -43,7 +43,7 @@ const LINES: &[(&str, &[(&str, &str)])] = &[
     ("specgen export c", &[("spec", "legs.toml"), ("output", "c")]),
     ("specgen export python", &[("spec", "legs.toml"), ("output", "python")]),
     ("specgen export fmu", &[("spec", "legs.toml"), ("output", "fmu")]),
-    ("specgen identify", &[("record", "r.csv"), ("drive", "0:100"), ("grid", "4")]),
+    ("specgen identify", &[("records", "r.csv"), ("drive", "0:100"), ("grid", "4")]),
     ("specgen identify linear", &[("records", "sine.csv")]),
     ("specgen identify response", &[("record", "r.csv")]),
     ("specgen identify gains", &[("recording", "run.rec"), ("spec", "legs.toml")]),

@@ -175,8 +175,16 @@ fn vertex([a, b, c]: [f64; 3], step: f64) -> f64 {
     0.5 * step * (a - c) / (a - 2.0 * b + c)
 }
 
-/// 10 % and 90 % quantile of the mean rates of the branches, V/s.
+/// 10 % and 90 % quantile of the mean rates of the branches, V/s; of joined records, the least and the largest of all.
 pub(crate) fn rates(record: &Record, branches: &[Branch]) -> (f64, f64) {
+    let each = record.spans().filter_map(|span| {
+        let own: Vec<Branch> = branches.iter().filter(|b| span.contains(&b.first)).copied().collect();
+        (!own.is_empty()).then(|| rates_of_one(record, &own))
+    });
+    each.reduce(|a, b| (if b.0 < a.0 { b.0 } else { a.0 }, if b.1 > a.1 { b.1 } else { a.1 })).unwrap_or_default()
+}
+
+fn rates_of_one(record: &Record, branches: &[Branch]) -> (f64, f64) {
     let mut rates: Vec<f64> = branches
         .iter()
         .map(|b| {

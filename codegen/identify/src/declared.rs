@@ -134,7 +134,7 @@ impl SpecRecords {
             let options = Options::new(model.hysteresis.grid, model.actuator.voltage);
             let options = Options { finest: finest(model), ..options };
             let record = parse_record(&text, name)?;
-            let choice = choose(&record, &options, model.hysteresis.model).map_err(about_voltage)?;
+            let choice = choose(&record, None, &options, model.hysteresis.model).map_err(about_voltage)?;
             let identified = choice.table;
             if matches!(model.hysteresis.rate, RateDependence::Creep(_)) {
                 self.warnings.push(static_table_with_creep(model, name));

@@ -65,6 +65,10 @@ const HUMS: usize = 3;
 pub(crate) fn repaired(record: &Record, range: [f64; 2], grid: usize, findings: &mut Findings) -> Record {
     let size = record.displacement_range();
     let mut record = record.clone();
+    // Each record was repaired before it was joined: a rate of its own looks like a defect among the others.
+    if !record.parts.is_empty() {
+        return record;
+    }
     let plane = Plane { grid: if grid < GRID { grid } else { GRID }, range };
     selection::mask_unknown(&mut record, &plane, findings);
     for _ in 0..PASSES {

@@ -13,6 +13,7 @@
 //! | module | what |
 //! |---|---|
 //! | `columns`, `container`, `record` | the reader of CSV, MATLAB, HDF5 and TDMS files; checked samples |
+//! | `joined` | several records of one leg as one |
 //! | `normal`, `selection`, `residual` | normal equations, choice of the grid, causes of the residual |
 //! | [`leg_model`] | families of leg models fitted to a record, and the choice among them |
 //! | [`rate`] | records at several rates: dead time, dynamic Preisach (6), creep, each tested on the rate it was not fitted on |
@@ -38,6 +39,7 @@ mod findings;
 pub mod gains;
 pub mod gauge;
 mod grid_choice;
+mod joined;
 mod least_squares;
 pub mod leg_model;
 mod limits;
@@ -78,6 +80,7 @@ pub use estimate::{Estimate, Parameter};
 pub use export::{is_table_csv, read_table_csv, write_table_csv};
 pub use file::{MAX_FILE_BYTES, read_file};
 pub use grid_choice::{GridChoice, Score, choose_grid};
+pub use joined::join;
 pub use leg_model::{read_leg_csv, write_leg_csv};
 pub use rate::predict::{Drive, Prediction, PredictionError, predict, read_drive, validate};
 pub use reading::Reading;
@@ -165,10 +168,13 @@ fn identify_checked(
     }
     let record = &defects::repaired(record, plane.range, plane.grid, findings);
     let mut used = selection::usable(record, &plane, findings)?;
-    let (dead_time, dead_time_basis) = match options.dead_time {
-        DeadTime::Estimate => dead_time::estimate(&plane, record, used.first, &used.branches),
-        DeadTime::FromTurns => turns::estimate(&plane, record, used.first, &used.branches),
-        DeadTime::Fixed(tau) => (if tau > 0.0 { tau } else { 0.0 }, "given".to_owned()),
+    let of_turns =
+        if options.dead_time == DeadTime::FromTurns { turns::estimate(record, &used.branches) } else { None };
+    let lag_of_turns = of_turns.is_some();
+    let (dead_time, dead_time_basis) = match (options.dead_time, of_turns) {
+        (DeadTime::Fixed(tau), _) => (if tau > 0.0 { tau } else { 0.0 }, "given".to_owned()),
+        (_, Some(found)) => found,
+        _ => dead_time::estimate(&plane, record, used.first, &used.branches),
     };
     used.until(dead_time::within(record, dead_time));
     let mut displacement = dead_time::delayed(record, dead_time);
@@ -226,6 +232,7 @@ fn identify_checked(
         dead_time,
         held: record.held(),
         dead_time_basis,
+        lag_of_turns,
         noise_floor,
         weightless: record.weightless[used.first..].iter().filter(|w| **w).count(),
         cause,

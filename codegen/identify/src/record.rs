@@ -3,6 +3,7 @@
 //! One run reports every problem of the file. [`super::coverage`] later checks the drive range.
 
 use std::io::Read;
+use std::ops::Range;
 use std::path::Path;
 
 use super::columns::{LineNumbers, RECORD};
@@ -20,7 +21,7 @@ const NAMES: [&str; 3] = ["time_s", "drive_V", "displacement_um"];
 /// A measured record in SI units, checked sample by sample.
 ///
 /// The three columns have equal length, at least 100; every value is finite;
-/// time increases strictly and has no gaps.
+/// time increases strictly and has no gaps, but between joined records.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Record {
     /// Name of the file as the user gave it.
@@ -37,6 +38,8 @@ pub struct Record {
     pub weightless: Vec<bool>,
     /// Whether a comment in the file marks it as simulated.
     pub simulated: bool,
+    /// First sample of each further record that was joined to this one; empty for a single record.
+    pub parts: Vec<usize>,
     /// Findings that refuse nothing.
     pub warnings: Vec<Diagnostic>,
 }
@@ -72,7 +75,18 @@ impl Record {
     /// command. 0 if the drive is the measured voltage, or is sampled more slowly than at 1 kHz.
     #[must_use]
     pub fn held(&self) -> f64 {
-        if self.monitored { 0.0 } else { hold(&self.time) }
+        let longest = |most: f64, span: Range<usize>| {
+            let half = hold(&self.time[span]);
+            if half > most { half } else { most }
+        };
+        if self.monitored { 0.0 } else { self.spans().fold(0.0, longest) }
+    }
+
+    /// The samples of each record that this one was joined from, in order.
+    pub(crate) fn spans(&self) -> impl Iterator<Item = Range<usize>> + '_ {
+        let firsts = [0].into_iter().chain(self.parts.iter().copied());
+        let ends = self.parts.iter().copied().chain([self.time.len()]);
+        firsts.zip(ends).map(|(first, end)| first..end)
     }
 
     /// Difference of the largest and the smallest displacement, m.
@@ -155,7 +169,8 @@ fn finish(
     let weightless = distrust::weightless(lines, &time, &drive, &mut displacement, &mut findings);
     let warnings = findings.into_diagnostics();
     let shown_as = shown_as.to_owned();
-    Ok(Record { shown_as, time, drive, monitored: false, displacement, weightless, simulated: false, warnings })
+    let parts = Vec::new();
+    Ok(Record { shown_as, time, drive, monitored: false, displacement, weightless, simulated: false, parts, warnings })
 }
 
 /// `values` at each `time` − `delay` (s), interpolated; the first value before the beginning.

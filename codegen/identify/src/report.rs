@@ -68,6 +68,9 @@ pub struct Report {
     pub held: f64,
     /// Basis of the dead time.
     pub dead_time_basis: String,
+    /// Whether it is a first-order lag, found where the drive turns.
+    #[serde(skip)]
+    pub lag_of_turns: bool,
     /// Standard deviation of white noise on the displacement.
     pub noise_floor: f64,
     /// Used samples without weight: glitches, and those after a jump.

@@ -1,5 +1,7 @@
 //! Selects the samples and branches of a record for the fit, and their weights.
 
+use std::ops::Range;
+
 use super::branches::{self, Branch};
 use super::coverage;
 use super::findings::Findings;
@@ -14,6 +16,8 @@ use specgen_language::diagnostic::codes;
 const AT_MINIMUM: f64 = 0.002;
 /// A change of direction is a reversal if the drive goes back by this many grid intervals.
 const REVERSAL: f64 = 0.5;
+/// Shortest rest at the lowest drive before the curves, s.
+const REST: f64 = 0.5;
 /// A record has first-order reversal curves if at least this fraction of its rises starts in saturation.
 const FIRST_ORDER: f64 = 0.9;
 /// Of such a record only the falls are fitted if they excite at least this fraction of the cells that all branches
@@ -82,6 +86,14 @@ pub(crate) fn mask_unknown(record: &mut Record, plane: &Plane, findings: &mut Fi
     findings.add(codes::RECORD_START, None, message, help);
 }
 
+/// Whether the drive rests at its lowest value before sample `first`, or the record begins there: its state, and the
+/// absence of earlier creep, are then known.
+pub(crate) fn begins_at_rest(record: &Record, plane: &Plane, first: usize) -> bool {
+    let minimum = at_minimum(record, plane);
+    let stay = record.drive[..=first].iter().rev().take_while(|u| **u <= minimum).count();
+    stay > first || stay > 0 && record.time[first] - record.time[first + 1 - stay] >= REST
+}
+
 /// Finds the usable part; refuses a record with too few reversal curves.
 pub(crate) fn usable(record: &Record, plane: &Plane, findings: &mut Findings) -> Option<RecordSpan> {
     let tolerance = AT_MINIMUM * (plane.range[1] - plane.range[0]);
@@ -94,7 +106,11 @@ pub(crate) fn usable(record: &Record, plane: &Plane, findings: &mut Findings) ->
         );
         return findings.refuse(codes::TOO_FEW_CURVES, None, message, &help);
     };
-    let branches = branches::branches(&record.drive, first, REVERSAL * plane.interval());
+    let of_part = |span: Range<usize>| {
+        let begin = if span.start > first { span.start } else { first };
+        branches::branches(&record.drive[..span.end], begin, REVERSAL * plane.interval())
+    };
+    let branches: Vec<Branch> = record.spans().flat_map(of_part).collect();
     let curves = coverage::check_curves(&branches, plane, findings);
     if findings.any_error() {
         return None;

@@ -30,8 +30,9 @@ const FASTER: &str = "if the column of times is in s, name it `time_s`; or give 
 pub(crate) fn check(plane: &Plane, record: &Record, used: &RecordSpan, report: &Report, findings: &mut Findings) {
     let span = plane.range[1] - plane.range[0];
     let gain = report.displacement_range / span;
-    let interval = median_interval(&record.time);
     let (rate, at) = fastest(record, used);
+    let own = record.spans().find(|span| span.contains(&at)).unwrap_or(0..record.time.len());
+    let interval = median_interval(&record.time[own]);
     check_time_unit(report, span, findings);
     let lag = if interval < LONGEST_LAG { interval } else { LONGEST_LAG };
     let unknown = !report.dead_time_basis.starts_with("estimated") && report.dead_time == 0.0;

@@ -9,7 +9,6 @@ use super::branches::Branch;
 use super::dead_time;
 use super::least_squares;
 use super::record::Record;
-use super::regressor::Plane;
 
 /// Longest part of a branch beside a turn, s, and as a fraction of the branch.
 const WINDOW: f64 = 20e-3;
@@ -27,15 +26,10 @@ const TURNS: usize = 4;
 const USEFUL: f64 = 5e-5;
 /// Lag beside which the curvature is taken if there is none, s.
 const NEAR: f64 = 1e-5;
-/// How the basis of an estimate from the turns begins.
-pub(super) const AT_TURNS: &str = "estimated where the drive turns";
-
-/// The dead time as [`dead_time::estimate`] gives it, but from the turns of the drive if their standard error is small enough.
-pub(super) fn estimate(plane: &Plane, record: &Record, first: usize, branches: &[Branch]) -> (f64, String) {
-    match lag(record, branches) {
-        Some([lag, error]) if error < USEFUL => (lag, format!("{}, standard error {:.3} ms", AT_TURNS, error * 1e3)),
-        _ => dead_time::estimate(plane, record, first, branches),
-    }
+/// The lag (s) from the turns of the drive if its standard error is small enough, and a text that describes the decision.
+pub(super) fn estimate(record: &Record, branches: &[Branch]) -> Option<(f64, String)> {
+    let [lag, error] = lag(record, branches).filter(|[_, error]| *error < USEFUL)?;
+    Some((lag, format!("estimated where the drive turns, standard error {:.3} ms", error * 1e3)))
 }
 
 /// A turn between two straight parts.
@@ -176,8 +170,8 @@ mod tests {
             }
         }
         let weightless = vec![false; time.len()];
-        let (shown_as, warnings) = (String::new(), Vec::new());
-        Record { shown_as, time, drive, monitored: false, displacement, weightless, simulated: true, warnings }
+        let (shown_as, parts, warnings) = (String::new(), Vec::new(), Vec::new());
+        Record { shown_as, time, drive, monitored: false, displacement, weightless, simulated: true, parts, warnings }
     }
 
     #[test]

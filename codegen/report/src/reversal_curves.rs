@@ -1,6 +1,6 @@
 //! Writes and plots records of reversal curves.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use host_sim::forc::ReversalRecord;
 use serde::Serialize;
@@ -10,11 +10,17 @@ use specgen_language::output::write_file;
 use crate::chart::{Axis, Chart, LINE};
 use crate::drawing::Plot;
 
+/// Suffixes of the files of the fast set and of the arbitrary record.
+const FURTHER: [&str; 2] = ["fast", "arbitrary"];
+
 /// A written record of reversal curves.
 #[derive(Serialize)]
 pub struct Curves {
     rows: usize,
     file: String,
+    /// The fast set and the arbitrary record.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    further: Vec<Curves>,
     /// The line about the plot.
     #[serde(skip)]
     plot: Option<String>,
@@ -29,27 +35,51 @@ fn chart(record: &ReversalRecord) -> Chart {
 impl Outcome for Curves {
     fn text(&self) -> String {
         let plot = self.plot.as_deref().unwrap_or_default();
-        format!("wrote {} rows to {}\n{plot}", self.rows, self.file)
+        let further: String = self.further.iter().map(Outcome::text).collect();
+        format!("wrote {} rows to {}\n{further}{plot}", self.rows, self.file)
     }
 }
 
 impl Curves {
-    /// Writes and plots a record.
+    /// Writes records: the first to `output`, further ones beside it. Plots the first.
     ///
     /// # Errors
     /// A file cannot be written.
-    pub fn of(record: &ReversalRecord, output: &Path, plot: &Plot) -> Result<Self, Failure> {
-        write_file(output, record.to_csv().as_bytes())?;
-        let plot = plot.charts("reversal curves", "displacement over drive", &[chart(record)])?;
-        Ok(Self { rows: record.rows.len(), file: output.display().to_string(), plot })
+    pub fn of(records: &[ReversalRecord], output: &Path, plot: &Plot) -> Result<Self, Failure> {
+        let texts: Vec<String> = records.iter().map(ReversalRecord::to_csv).collect();
+        let charts: Vec<Chart> = records.iter().take(1).map(chart).collect();
+        // Two lines that are not rows: names and mark.
+        let written = Self::write(&texts, 2, output)?;
+        Ok(Self { plot: plot.charts("reversal curves", "displacement over drive", &charts)?, ..written })
     }
 
-    /// Writes a drive signal for a generator; the text starts with a header line.
+    /// Writes drive signals for a generator, as [`Curves::of`]; each text starts with a header line.
     ///
     /// # Errors
-    /// The file cannot be written.
-    pub fn of_drive(text: &str, output: &Path) -> Result<Self, Failure> {
-        write_file(output, text.as_bytes())?;
-        Ok(Self { rows: text.lines().count() - 1, file: output.display().to_string(), plot: None })
+    /// A file cannot be written.
+    pub fn of_drives(texts: &[String], output: &Path) -> Result<Self, Failure> {
+        Self::write(texts, 1, output)
     }
+
+    fn write(texts: &[String], heads: usize, output: &Path) -> Result<Self, Failure> {
+        let paths = [output.to_owned()].into_iter().chain(FURTHER.map(|suffix| beside(output, suffix)));
+        let mut written = Vec::new();
+        for (text, path) in texts.iter().zip(paths) {
+            write_file(&path, text.as_bytes())?;
+            let rows = text.lines().count() - heads;
+            written.push(Self { rows, file: path.display().to_string(), further: Vec::new(), plot: None });
+        }
+        let further = written.split_off(1);
+        Ok(Self { further, ..written.remove(0) })
+    }
+}
+
+/// `leg.csv` to `leg-fast.csv`.
+fn beside(output: &Path, suffix: &str) -> PathBuf {
+    let part = |part: Option<&std::ffi::OsStr>| part.unwrap_or_default().to_string_lossy().into_owned();
+    let mut name = format!("{}-{suffix}", part(output.file_stem()));
+    if output.extension().is_some() {
+        name += &format!(".{}", part(output.extension()));
+    }
+    output.with_file_name(name)
 }

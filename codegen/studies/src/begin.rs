@@ -286,7 +286,7 @@ fn rounded(value: f64, digits: i32, to_whole: impl Fn(f64) -> f64) -> String {
 /// A simulated record of a leg; `None` if the spec is not complete enough.
 fn simulated_record(draft: &Draft, name: &str, place: &Path) -> Option<String> {
     let (model, _) = spec::load_as_far(&source(draft, name, place));
-    Some(simulate(&model?, &Experiment::default()).to_csv())
+    simulate(&model?, &Experiment::default()).first().map(|record| record.to_csv())
 }
 
 /// Fits workspace, bias, stream speed and gauge range to the reach of the legs, where they were not given.

@@ -5,11 +5,12 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Mutex, OnceLock, PoisonError};
 
 use host_sim::controller::Controller;
-use host_sim::forc::{ReversalExperiment, ReversalRow};
+use host_sim::forc::{RandomDrive, ReversalExperiment, ReversalRow};
 use host_sim::noise::Gauge;
 use host_sim::plant::{LegParameters, LegPlant};
 use host_sim::platform::rig::{Noise, RunOptions};
 use host_sim::platform::{PlatformScenario, Specimen};
+use specgen::identify::{Record, parse_record};
 use specgen::stability::platform::Design;
 use specgen_tests::{Emitted, length};
 
@@ -17,6 +18,8 @@ use specgen_tests::{Emitted, length};
 pub const PERIOD: f64 = 1e-4;
 /// Its bias pose.
 pub const BIAS: [f64; 6] = [0.0, 0.0, 10e-6, 0.0, 0.0, 0.0];
+/// Voltage range of the legs, V.
+pub const VOLTAGE: [f64; 2] = [0.0, 100.0];
 /// Seed of gauge and amplifier noise.
 pub const SEED: u64 = 1;
 
@@ -110,6 +113,20 @@ pub fn two_rates(legs: &[LegParameters; 6]) -> [String; 6] {
         record.rows.extend(more.map(|row| ReversalRow { time: last + row.time, ..row }));
         record.to_csv()
     })
+}
+
+/// Slow curves, fast ones and a random motion of a leg, one after the other as `specgen forc --two-rates` takes them.
+pub fn three_records(leg: &LegParameters, number: u64) -> [Record; 3] {
+    let (mut plant, mut gauge) = (LegPlant::new(leg), Gauge::new(&leg.noise, SEED, number));
+    let slow = ReversalExperiment { update: 5e-4, ..ReversalExperiment::reference(32) };
+    let fast = ReversalExperiment { rate: 640.0, ..ReversalExperiment::reference(4) }.sampled(10_000.0);
+    let slow = slow.run(&mut plant, &mut gauge);
+    plant.hold(0.0, 1.0);
+    let fast = fast.run(&mut plant, &mut gauge);
+    plant.hold(0.0, 1.0);
+    let random = RandomDrive::over(VOLTAGE, 10_000.0).run(&mut plant, &mut gauge);
+    let named = [("leg.csv", slow), ("leg-fast.csv", fast), ("leg-arbitrary.csv", random)];
+    named.map(|(name, record)| parse_record(&record.to_csv(), name).unwrap())
 }
 
 /// Applies `each` to 0..`count` on as many threads as the machine has; the results are in order.

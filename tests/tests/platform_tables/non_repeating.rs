@@ -7,9 +7,12 @@ use host_sim::platform::{PlatformParameters, Specimen};
 use host_sim::trajectory::{PoseTarget, PoseTrajectory};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
+use specgen::identify::leg_model::choose;
+use specgen::identify::{MAX_GRID, Options, join, write_leg_csv};
+use specgen::model::LegModelKind;
 use specgen_tests::{damped, leg_class, length, skipped};
 
-use super::bench::{Bench, in_parallel, two_rates};
+use super::bench::{Bench, VOLTAGE, in_parallel, three_records, two_rates};
 
 /// One sine of an axis: axis, amplitude (m), angular frequency (rad/s), phase.
 type Line = (usize, f64, f64, f64);
@@ -130,10 +133,32 @@ fn plays_follow_what_does_not_repeat_no_worse_with_a_chosen_model_than_with_the_
     }
 }
 
-/// A controller with the leg model that is chosen from curves at two rates; `grid` of the spec, none by default.
-fn chosen(class: u32, grid: Option<usize>) -> Bench {
+/// Records of the legs.
+#[derive(Clone, Copy, Debug)]
+enum Records {
+    /// Curves at two rates in one file, which the spec names; with `hysteresis.grid` or without.
+    OneFile(Option<usize>),
+    /// Those of `specgen forc --two-rates`, from which `specgen identify` chooses the models that the spec names.
+    ThreeFiles,
+}
+
+/// The chosen model of a leg, as `identify --model auto --validate` writes it.
+fn identified(leg: &LegParameters, number: u64) -> String {
+    let [slow, fast, random] = three_records(leg, number);
+    let options = Options { finest: MAX_GRID, ..Options::new(32, VOLTAGE) };
+    let both = join(&[slow, fast], VOLTAGE).unwrap();
+    write_leg_csv(&choose(&both, Some(&random), &options, LegModelKind::Auto).unwrap().model)
+}
+
+/// A controller with the leg models that are chosen from `records`.
+fn chosen(class: u32, records: Records) -> Bench {
     let legs = Specimen::within_tolerances(&PlatformParameters::reference(), &leg_class(class.into()), 1);
-    let records = two_rates(&legs.legs);
+    let (name, records, grid) = match records {
+        Records::OneFile(grid) => ("one", two_rates(&legs.legs), grid),
+        Records::ThreeFiles => {
+            ("three", std::array::from_fn(|leg| identified(&legs.legs[leg], leg as u64)), Some(MAX_GRID))
+        }
+    };
     let grid = grid.map_or(String::new(), |grid| format!("grid = {grid}\n"));
     let hysteresis = format!("{grid}memory  = 64\nmodel   = \"auto\"");
     let edits = [
@@ -141,7 +166,7 @@ fn chosen(class: u32, grid: Option<usize>) -> Bench {
         ("flash        = \"128 KiB\"", "flash        = \"1 MiB\""),
         damped(),
     ];
-    Bench::with_records(&format!("non-repeating-{class}-{}", grid.trim()), legs, &records, &edits)
+    Bench::with_records(&format!("non-repeating-{class}-{name}-{}", grid.trim()), legs, &records, &edits)
 }
 
 /// What the default choice is held to, nm rms: random, raster and spiral of each class. Measured: 6.6, 3.2, 8.1 nm in class 0, 2.6, 1.8,
@@ -153,17 +178,19 @@ const BARS: [[f64; 3]; 3] = [[7.2, 3.6, 8.8], [3.0, 2.2, 5.0], [13.6, 7.2, 15.2]
 #[ignore = "long: every family fitted to six records of each class, and a controller of each"]
 fn the_default_choice_follows_what_does_not_repeat() {
     let only: Option<u32> = std::env::var("SPECGEN_CLASS").ok().and_then(|class| class.parse().ok());
-    let grids = if only.is_none() { &[None][..] } else { &[Some(32), Some(64), Some(128), None] };
+    let given = [32, 64, 128].map(|grid| Records::OneFile(Some(grid)));
+    let given = if only.is_none() { &[] } else { &given[..] };
+    let all = [given, &[Records::OneFile(None), Records::ThreeFiles]].concat();
     for class in (0..3).filter(|class| only.is_none_or(|only| only == *class)) {
-        let found = in_parallel(grids.len() as u32, |which| {
-            let bench = chosen(class, grids[which as usize]);
+        let found = in_parallel(all.len() as u32, |which| {
+            let bench = chosen(class, all[which as usize]);
             (bench.emitted.compiled.ir.hysteresis.grid, errors(&bench))
         });
-        for (given, (grid, errors)) in grids.iter().zip(&found) {
-            let what = given.map_or("chosen", |_| "given");
-            shown(&format!("class {class}, grid {grid} ({what})"), *errors);
+        for (records, (grid, errors)) in all.iter().zip(&found) {
+            shown(&format!("class {class}, grid {grid}, {records:?}"), *errors);
         }
-        let Some((_, chosen)) = found.last() else { unreachable!() };
-        assert!(chosen.iter().zip(BARS[class as usize]).all(|(error, bar)| *error <= bar), "class {class}: {chosen:?}");
+        for (_, found) in &found[given.len()..] {
+            assert!(found.iter().zip(BARS[class as usize]).all(|(error, bar)| *error <= bar), "class {class}: {found:?}");
+        }
     }
 }

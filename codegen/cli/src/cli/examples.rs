@@ -290,6 +290,8 @@ Examples:
   specgen forc platform.toml -o another.csv   # a leg of this spec
   specgen forc -o fast.csv --rate 2000 --grid 16
       a second rate, for `identify rate`
+  specgen forc -o leg.csv --two-rates --grid 8
+      and leg-fast.csv, leg-arbitrary.csv, for `identify --model auto`
   specgen forc --drive-only --drive -90:90 --sampling 1000 -o drive.csv
       the drive signal for a waveform generator";
 

@@ -30,6 +30,10 @@ pub struct Arguments {
     /// rates.
     #[arg(long, value_name = "V/S", allow_negative_numbers = true, value_parser = number("", "a slope from 0.1 to 100000 V/s", 0.1..=1e5))]
     rate: Option<f64>,
+    /// Also write a set of 4 curves at 32 times the rate (FILE-fast) and a random drive of 10 s (FILE-arbitrary):
+    /// `identify` separates creep from rate dependence with them.
+    #[arg(long)]
+    two_rates: bool,
     /// Write only the drive signal, for a waveform generator: 0 V to the lowest voltage, one second there, then the curves.
     #[arg(long, conflicts_with_all = ["plot", "seed", "no_noise"])]
     drive_only: bool,
@@ -48,13 +52,14 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     let Arguments { output, grid, rate, drive, sampling, plant, .. } = arguments;
     let (grid, rate, spec) = (*grid, *rate, arguments.spec.as_deref());
+    let two_rates = arguments.two_rates;
     let PlantArguments { seed, no_noise, .. } = *plant;
     let curves = if arguments.drive_only {
-        let experiment = Experiment { grid, rate, ..Experiment::default() };
-        Curves::of_drive(&experiment.drive(spec, *drive, *sampling)?, output)?
+        let experiment = Experiment { grid, rate, two_rates, ..Experiment::default() };
+        Curves::of_drives(&experiment.drives(spec, *drive, *sampling)?, output)?
     } else {
-        let experiment = Experiment { grid, rate, seed, no_noise, shape: plant.options().leg()? };
-        Curves::of(&experiment.record(spec)?, output, &arguments.plot.place())?
+        let experiment = Experiment { grid, rate, seed, no_noise, two_rates, shape: plant.options().leg()? };
+        Curves::of(&experiment.records(spec)?, output, &arguments.plot.place())?
     };
     ui.result(&curves);
     Ok(())

@@ -21,7 +21,7 @@ use super::plot::Plot;
 #[command(
     args_conflicts_with_subcommands = true,
     subcommand_negates_reqs = true,
-    override_usage = "specgen identify [OPTIONS] --drive <MIN:MAX> <RECORD>\n       specgen identify [OPTIONS] --spec <SPEC> <RUN.rec>\n       specgen identify <COMMAND>",
+    override_usage = "specgen identify [OPTIONS] --drive <MIN:MAX> <RECORD>...\n       specgen identify [OPTIONS] --spec <SPEC> <RUN.rec>\n       specgen identify <COMMAND>",
     after_help = super::examples::IDENTIFY
 )]
 pub struct Arguments {
@@ -52,10 +52,11 @@ enum Kind {
 /// Arguments of `identify RECORD`.
 #[derive(Args, Debug)]
 struct EverettArguments {
-    /// Reversal-curve record (CSV, MATLAB, HDF5, TDMS) with columns time_s, drive_V, displacement_um. With --spec: a recorded
-    /// run of a platform, from which gain, delay and cubic term of each leg are refitted.
-    #[arg(required = true)]
-    record: Option<InputFile>,
+    /// Reversal-curve record (CSV, MATLAB, HDF5, TDMS) with columns time_s, drive_V, displacement_um; further ones of
+    /// the same leg, at other rates, are fitted together with it. With --spec: a recorded run of a platform, from which
+    /// gain, delay and cubic term of each leg are refitted.
+    #[arg(required = true, value_name = "RECORD")]
+    records: Vec<InputFile>,
     /// Voltage range of the table, V, such as 0:100 or -90:90.
     #[arg(long, value_name = "MIN:MAX", value_parser = range, allow_hyphen_values = true)]
     drive: Option<[f64; 2]>,
@@ -71,7 +72,8 @@ struct EverettArguments {
     /// Leg model: auto compares the families on curves that are held out; or preisach, bouc-wen, generalized-plays, plays, bouc-wen-plays.
     #[arg(long, value_name = "MODEL", value_parser = model, default_value = "preisach")]
     model: LegModelKind,
-    /// A second record of the leg, not used in the fit, to validate the table.
+    /// Another record of the leg, not used in the fit, to validate the table; with --model auto the model with the least
+    /// error on it is chosen.
     #[arg(long, value_name = "RECORD")]
     validate: Option<InputFile>,
     /// Write the table to this file (CSV: up_V, down_V, everett_um). With --spec: the folder for six tables, leg1.csv to
@@ -313,23 +315,28 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
 
 /// A record without a command: a recorded run, or reversal curves.
 fn record(arguments: &EverettArguments, ui: &mut Ui) -> Result<(), Failure> {
-    let EverettArguments { record, drive, spec, grid, dead_time, model, validate, output, bench } = arguments;
+    let EverettArguments { records, drive, spec, grid, dead_time, model, validate, output, bench } = arguments;
     let usage = |text: &str| Err(Failure::Usage(text.to_owned()));
-    // clap requires it unless there is a subcommand.
-    let Some(record) = record else { return usage("expected a record: see `specgen identify --help`") };
     if let Some(spec) = spec {
-        return refit::run(record, spec, output.as_deref(), ui);
+        return match &records[..] {
+            [run] => refit::run(run, spec, output.as_deref(), ui),
+            _ => usage("expected one recorded run with --spec: see `specgen identify --help`"),
+        };
     }
-    if refit::is_recorded_run(record) {
+    if let Some(record) = records.iter().find(|record| refit::is_recorded_run(record)) {
         return usage(&format!(
             "`{}` is a recorded run: give the spec of its target with --spec SPEC",
             record.display()
         ));
+    }
+    // clap requires a record unless there is a subcommand.
+    if records.is_empty() {
+        return usage("expected a record: see `specgen identify --help`");
     }
     // A folder in its place is for a recorded run only.
     output.as_deref().map_or(Ok(()), check_place)?;
     let Some(drive) = drive else { return usage("expected the voltage range of the table, --drive MIN:MAX in V") };
     let dead_time = dead_time.map_or(DeadTime::Estimate, |ms| DeadTime::Fixed(ms * 1e-3));
     let options = everett::Options { drive: *drive, grid: *grid, dead_time, model: *model };
-    everett::run(record, &options, validate.as_deref(), output.as_deref(), &bench.bench()?, ui)
+    everett::run(records, &options, validate.as_deref(), output.as_deref(), &bench.bench()?, ui)
 }

@@ -10,11 +10,14 @@ use crate::branches::Branch;
 use crate::everett::EverettTable;
 use crate::findings::Findings;
 use crate::normal::{self, Weighting};
+use crate::rate::RateModel;
 use crate::record::Record;
 use crate::regressor::{self, Plane};
 use crate::staircase::Staircase;
 use crate::statistics::{mean, mean_and_error};
-use crate::{DeadTime, Identification, dead_time, grid_choice, identify, prior, selection, turns};
+use crate::{
+    DeadTime, Drive, Identification, dead_time, grid_choice, identify, joined, predict, prior, selection, validate,
+};
 use specgen_language::diagnostic::{Diagnostic, codes};
 use specgen_language::model::LegModelKind as Kind;
 
@@ -37,6 +40,9 @@ pub struct FamilyScore {
     pub held_out_rms: f64,
     /// Standard error of the difference to the best family over the folds, m; 0 for the best one.
     pub standard_error: f64,
+    /// Root mean square on the arbitrary record, if there is one, m.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub arbitrary_rms: Option<f64>,
 }
 
 /// The choice of a leg model.
@@ -52,24 +58,34 @@ pub struct Choice {
     pub table: Identification,
 }
 
-/// Fits the families that `kind` permits to `record` and chooses one; `options` as in [`identify`]. A model with plays may
-/// be on a finer grid, see [`crate::Options::finest`].
+/// Fits the families that `kind` permits to `record`, one or [joined](crate::join), and chooses one: by the error on
+/// the `arbitrary` record if there is one, otherwise on curves that were held out. `options` as in [`identify`]. A model
+/// with plays may be on a finer grid, see [`crate::Options::finest`].
 ///
 /// # Errors
-/// As [`identify`]; E0622 if the curves turn back at too few voltages to hold any out.
-pub fn choose(record: &Record, options: &crate::Options, kind: Kind) -> Result<Choice, Vec<Diagnostic>> {
+/// As [`identify`] and [`crate::predict`]; E0622 if the curves turn back at too few voltages to hold any out.
+pub fn choose(
+    record: &Record,
+    arbitrary: Option<&Record>,
+    options: &crate::Options,
+    kind: Kind,
+) -> Result<Choice, Vec<Diagnostic>> {
     // A table has a weight for each of its cells, so those that are compared with leg models stay coarse.
     let dead_time = if options.dead_time == DeadTime::Estimate { DeadTime::FromTurns } else { options.dead_time };
     let coarse =
         crate::Options { grid: if options.grid > PLAYS { PLAYS } else { options.grid }, dead_time, ..*options };
     let table = identify(record, if kind == Kind::Preisach { options } else { &coarse })?;
+    let arbitrary = match arbitrary {
+        Some(other) => validate(&table.table, other, table.report.dead_time).map(|_| Some(Drive::from(other)))?,
+        None => None,
+    };
     if kind == Kind::Preisach {
         let family = Family { kind, creep: false };
         let model = LegModel { table: table.table.clone(), around: None };
         return Ok(Choice { family, model, scores: Vec::new(), table });
     }
     let mut findings = Findings::after(&record.shown_as, &table.warnings);
-    let found = chosen(record, options, kind, &table, &mut findings);
+    let found = chosen((record, arbitrary.as_ref()), options, kind, &table, &mut findings);
     let ((family, model, scores), warnings) = findings.conclude(found)?;
     Ok(Choice { family, model, scores, table: Identification { warnings, ..table } })
 }
@@ -85,7 +101,7 @@ struct Candidate {
 }
 
 fn chosen(
-    record: &Record,
+    (record, arbitrary): (&Record, Option<&Drive>),
     options: &crate::Options,
     kind: Kind,
     table: &Identification,
@@ -96,8 +112,12 @@ fn chosen(
     let (slow, fast) = dead_time::rates(record, &used.branches);
     if fast < dead_time::RATE_RATIO * slow {
         let message = format!("one rate ({slow:.0} to {fast:.0} V/s): creep and rate dependence look alike");
-        let help = "append curves at a much higher rate, all sampled at one rate of at least 1 kHz: their turns also show the dead time";
+        let help = "name a second record of some curves at a much higher rate, such as the range in 0.2 s, sampled at 1 kHz or more: its turns also show the dead time";
         findings.add(codes::CREEP_FROM_ONE_RATE, None, message, help);
+    }
+    let at_rest = selection::begins_at_rest(record, &plane, used.first);
+    if !at_rest {
+        joined::rest_unknown(record, used.first, findings);
     }
     let (fold_of, folds, levels) = grid_choice::deal(record, &used.branches, options.drive);
     if folds < FEWEST_FOLDS {
@@ -110,9 +130,10 @@ fn chosen(
     }
     // A lag that was found at the turns also cuts them off; any other dead time only shifts the displacement.
     let delay = table.report.dead_time;
-    let turned = delay > 0.0 && table.report.dead_time_basis.starts_with(turns::AT_TURNS);
+    let turned = delay > 0.0 && table.report.lag_of_turns;
     let late = turned.then(|| Record { drive: dead_time::lagged(record, delay), ..record.clone() });
-    let data = Data::new(late.as_ref().unwrap_or(record), &plane, &used, &fold_of, if turned { 0.0 } else { delay });
+    let mut data = Data::new(late.as_ref().unwrap_or(record), &plane, &used, &fold_of, if turned { 0.0 } else { delay });
+    data.samples.at_rest = at_rest;
     let mut candidates: Vec<Candidate> = Vec::new();
     for family in Family::all().into_iter().filter(|family| kind == Kind::Auto || family.kind == kind) {
         candidates.extend(data.candidate(family, folds));
@@ -126,15 +147,28 @@ fn chosen(
     };
     let mut scores = Vec::new();
     let mut chosen: Option<Candidate> = None;
-    let worthwhile = WORTHWHILE[0] * mean(&best).sqrt() + WORTHWHILE[1] * table.report.noise_floor * 1e6;
-    for candidate in candidates {
+    let noise = WORTHWHILE[1] * table.report.noise_floor;
+    let worthwhile = WORTHWHILE[0] * mean(&best).sqrt() + noise * 1e6;
+    let error_on = |model: Option<&LegModel>, drive: &Drive| {
+        let model = RateModel { dead_time: delay, ..RateModel::of_leg(model?.clone()) };
+        Some(predict(&model, drive).ok()?.compared?.rms)
+    };
+    let on_arbitrary: Vec<Option<f64>> =
+        candidates.iter().map(|candidate| error_on(candidate.model.as_ref(), arbitrary?)).collect();
+    let least = on_arbitrary.iter().flatten().copied().reduce(|a, b| if b < a { b } else { a });
+    for (candidate, arbitrary_rms) in candidates.into_iter().zip(on_arbitrary) {
         let worse: Vec<f64> = candidate.squares.iter().zip(&best).map(|(a, b)| a.sqrt() - b.sqrt()).collect();
         let (excess, error) = mean_and_error(&worse);
         let held_out_rms = mean(&candidate.squares).sqrt() * 1e-6;
-        scores.push(FamilyScore { family: candidate.family, held_out_rms, standard_error: error * 1e-6 });
+        let standard_error = error * 1e-6;
+        scores.push(FamilyScore { family: candidate.family, held_out_rms, standard_error, arbitrary_rms });
         // The table has to be as good as the others; among these the price decides.
         let slack = if candidate.family.kind == Kind::Preisach { 0.0 } else { worthwhile };
-        if chosen.is_none() && (excess <= error || excess <= slack) {
+        let good = match least {
+            Some(least) => arbitrary_rms.is_some_and(|rms| rms <= (1.0 + WORTHWHILE[0]) * least + noise),
+            None => excess <= error || excess <= slack,
+        };
+        if chosen.is_none() && good {
             chosen = Some(candidate);
         }
     }
@@ -174,23 +208,34 @@ impl<'a> Data<'a> {
         delay: f64,
     ) -> Self {
         let (first, end) = (used.first, used.end);
-        let every = (end - first).div_ceil(SAMPLES);
+        // Equal weight for each record.
+        let most = SAMPLES / (record.parts.len() + 1);
+        let mut thinned = vec![false; end - first];
+        let mut parts = Vec::new();
+        for span in record.spans() {
+            let span = span.start.saturating_sub(first)..span.end.min(end) - first;
+            parts.push(span.start);
+            let every = span.len().div_ceil(most).max(1);
+            span.step_by(every).for_each(|k| thinned[k] = true);
+        }
         let y: Vec<f64> = dead_time::delayed(record, delay)[first..end].iter().map(|y| y * 1e6).collect();
         let mut of_branch = vec![None; end - first];
         for (at, branch) in used.branches.iter().enumerate() {
             let span = branch.first - first..(branch.end - first).min(end - first);
             of_branch[span].fill(Some(at));
         }
-        let kept: Vec<usize> = (0..end - first).filter(|k| k % every == 0 && !record.weightless[first + k]).collect();
+        let kept: Vec<usize> = (0..end - first).filter(|k| thinned[*k] && !record.weightless[first + k]).collect();
         let pick = |values: &[f64]| -> Vec<f64> { kept.iter().map(|k| values[*k]).collect() };
         let (time, drive) = (&record.time[first..end], &record.drive[first..end]);
-        let samples = Samples::new(
+        let mut samples = Samples::new(
             plane.range,
             [pick(time), pick(drive), pick(&y)],
             fold_of.to_vec(),
             kept.iter().map(|k| of_branch[*k]).collect(),
         );
-        let whole = Samples::new(plane.range, [time.to_vec(), drive.to_vec(), y], Vec::new(), Vec::new());
+        let mut whole = Samples::new(plane.range, [time.to_vec(), drive.to_vec(), y], Vec::new(), Vec::new());
+        samples.parts = parts[1..].iter().map(|first| kept.partition_point(|k| k < first)).collect();
+        whole.parts = parts.split_off(1);
         let least = SCORED * (plane.range[1] - plane.range[0]);
         let scored = used.branches.iter().zip(fold_of).enumerate().filter_map(|(at, (branch, fold))| {
             let span = (record.drive[branch.end - 1] - record.drive[branch.first]).abs();

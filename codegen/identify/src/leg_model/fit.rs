@@ -37,6 +37,10 @@ pub(super) struct Samples {
     pub(super) folds: Vec<Option<usize>>,
     /// Branch of each sample, in order; none is not fitted.
     pub(super) branch: Vec<Option<usize>>,
+    /// First sample of each further record.
+    pub(super) parts: Vec<usize>,
+    /// Whether the first sample is at rest: its displacement ties the read-out.
+    pub(super) at_rest: bool,
     /// Of each step and time constant: what remains of a state, and the share of the last and the present h.
     steps: Vec<[[f64; 3]; TIMES.len()]>,
 }
@@ -57,7 +61,12 @@ impl Samples {
             })
         };
         let steps = time.windows(2).map(step).collect();
-        Self { range, time, drive, y, folds, branch, steps }
+        Self { range, time, drive, y, folds, branch, parts: Vec::new(), at_rest: false, steps }
+    }
+
+    /// Number of the record that sample `k` is from.
+    fn part(&self, k: usize) -> usize {
+        self.parts.partition_point(|first| *first <= k)
     }
 
     /// Samples of each branch and its fold, those of fold `out` left out.
@@ -85,12 +94,19 @@ impl Samples {
         sum / count as f64
     }
 
-    /// The h whose creep of level `c` gives y; at rest at the first sample.
+    /// The h whose creep of level `c` gives y; at rest at the first sample of each record.
     pub(super) fn without_creep(&self, c: f64) -> Vec<f64> {
-        let mut h = self.y.first().copied().unwrap_or(0.0) / (1.0 + c * TIMES.len() as f64);
+        let rest = |y: f64| y / (1.0 + c * TIMES.len() as f64);
+        let mut h = rest(self.y.first().copied().unwrap_or(0.0));
         let mut states = [h; TIMES.len()];
         let mut all = vec![h];
         for (step, y) in self.steps.iter().zip(&self.y[1..]) {
+            if self.parts.contains(&all.len()) {
+                h = rest(*y);
+                states = [h; TIMES.len()];
+                all.push(h);
+                continue;
+            }
             let (mut carried, mut direct) = (0.0, 1.0);
             for (state, [decay, known, now]) in states.iter_mut().zip(step) {
                 *state = decay * *state + known * h;
@@ -104,11 +120,16 @@ impl Samples {
         all
     }
 
-    /// y of an h that begins at rest at 0.
+    /// y of an h that begins each record at rest at 0.
     pub(super) fn with_creep(&self, c: f64, h: &[f64]) -> Vec<f64> {
         let mut states = [0.0; TIMES.len()];
         let mut all = vec![h[0]];
         for (step, pair) in self.steps.iter().zip(h.windows(2)) {
+            if self.parts.contains(&all.len()) {
+                states = [0.0; TIMES.len()];
+                all.push(pair[1]);
+                continue;
+            }
             let mut sum = 0.0;
             for (state, [decay, known, now]) in states.iter_mut().zip(step) {
                 *state = decay * *state + known * pair[0] + now * pair[1];
@@ -196,16 +217,25 @@ impl<'a> Problem<'a> {
         let mut states: Vec<f64> = r.iter().map(start).collect();
         let starts = if family.creeps() && !family.floats() { STARTS } else { 0 };
         let bounded = r.len() * if family.is_cubic() { 3 } else { 1 };
-        let width = bounded + 1 + starts;
+        // Of each record the start of its creep; of further ones also an offset.
+        let starts_of = |part: usize| if part == 0 { starts } else { starts + usize::from(starts > 0) };
+        let records = samples.parts.len() + 1;
+        let width = bounded + 1 + (0..records).map(starts_of).fold(0, |sum, own| sum + own);
         let mut fixed = Vec::with_capacity(width * samples.time.len());
-        for (u, t) in samples.drive.iter().zip(&samples.time) {
+        for (k, (u, t)) in samples.drive.iter().zip(&samples.time).enumerate() {
             interrupt::point();
             for (p, r) in states.iter_mut().zip(&r) {
                 *p = play(*p, *r, *u, range);
                 of_play(family, range, *r, *p, &mut |value| fixed.push(value));
             }
             fixed.push(1.0);
-            fixed.extend(TIMES[..starts].iter().map(|tau| libm::exp((samples.time[0] - t) / tau)));
+            let own = samples.part(k);
+            let begun = own.checked_sub(1).map_or(samples.time[0], |further| samples.time[samples.parts[further]]);
+            for part in 0..records {
+                let here = if part == own { 1.0 } else { 0.0 };
+                fixed.extend(TIMES[..starts].iter().map(|tau| here * libm::exp((begun - t) / tau)));
+                fixed.extend((starts_of(part) > starts).then_some(here));
+            }
         }
         let folds = samples.folds.iter().flatten().fold(0, |most, fold| if *fold < most { most } else { fold + 1 });
         let mut grams = vec![vec![0.0; width * width]; folds + 1];
@@ -335,7 +365,13 @@ impl<'a> Problem<'a> {
             }
             residual.push(sum);
         }
-        let offset = if self.family.floats() { mean(&residual) } else { 0.0 };
+        let offset = if !self.family.floats() {
+            0.0
+        } else if samples.at_rest {
+            residual[0]
+        } else {
+            mean(&residual)
+        };
         values[one] -= offset;
         for (r, h) in residual.iter_mut().zip(&h) {
             *r = (*r - offset) / self.steepness(&values, *h);

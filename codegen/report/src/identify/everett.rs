@@ -2,16 +2,17 @@
 
 use crate::drawing::wrote;
 use specgen_identify::leg_model::{Choice, FamilyScore, choose};
-use specgen_identify::{self as identify, DeadTime, GridChoice, Prediction, Reading, Report};
+use specgen_identify::rate::RateModel;
+use specgen_identify::{self as identify, DeadTime, Drive, GridChoice, Prediction, Report, predict};
 use std::fmt::Write as _;
 use std::path::Path;
 
 use serde::Serialize;
 
 use super::cause::account;
-use super::{Bench, MeasuredKeys, predict, refused};
+use super::predict::summary;
+use super::{Bench, MeasuredKeys, refused};
 use crate::identification as figure;
-use specgen_language::diagnostic::Diagnostic;
 use specgen_language::model::LegModelKind;
 use specgen_language::outcome::{Failure, Outcome};
 use specgen_language::output::write_file;
@@ -31,12 +32,12 @@ pub struct Options {
     pub model: LegModelKind,
 }
 
-/// Reads the record, identifies, writes the requested files and shows the result.
+/// Reads the records of a leg, identifies, writes the requested files and shows the result.
 ///
 /// # Errors
 /// A file cannot be read or written, or its data are unsuitable.
 pub fn run(
-    path: &Path,
+    paths: &[impl AsRef<Path>],
     &Options { drive, grid, dead_time, model }: &Options,
     validation: Option<&Path>,
     output: Option<&Path>,
@@ -44,8 +45,10 @@ pub fn run(
     ui: &mut Ui,
 ) -> Result<(), Failure> {
     let reading = &bench.reading;
-    let shown = path.display().to_string();
-    let record = identify::read_record(path, &shown, reading).map_err(refused)?;
+    let read = |path: &Path| identify::read_record(path, &path.display().to_string(), reading).map_err(refused);
+    let records = paths.iter().map(|path| read(path.as_ref())).collect::<Result<Vec<_>, _>>()?;
+    let record = identify::join(&records, drive).map_err(refused)?;
+    let validation = validation.map(read).transpose()?;
     let choice = match grid {
         Some(_) => None,
         None => Some(identify::choose_grid(&record, drive, dead_time).map_err(refused)?),
@@ -53,15 +56,16 @@ pub fn run(
     let grid = grid.or(choice.as_ref().map(|c| c.chosen)).unwrap_or_default();
     let finest = if choice.is_some() { identify::MAX_GRID } else { grid };
     let options = identify::Options { dead_time, finest, ..identify::Options::new(grid, drive) };
-    let chosen = choose(&record, &options, model).map_err(refused)?;
+    let chosen = choose(&record, validation.as_ref(), &options, model).map_err(refused)?;
     let grid = chosen.model.table.grid;
-    let families = families(&chosen, grid);
+    let families = families(&chosen, grid, validation.as_ref().map(|record| record.shown_as.as_str()));
     let Choice { table: identified, model, scores, .. } = chosen;
     ui.findings(None, &identified.warnings);
-    let validation = match validation {
-        Some(path) => Some(validate(path, &identified, reading).map_err(refused)?),
-        None => None,
+    let validate = |record: &identify::Record| {
+        let model = RateModel { dead_time: identified.report.dead_time, ..RateModel::of_leg(model.clone()) };
+        predict(&model, &Drive::from(record)).map_err(refused)
     };
+    let validation = validation.as_ref().map(validate).transpose()?;
     if let Some(output) = output {
         let text = identify::write_leg_csv(&model);
         let text = if record.simulated { identify::marked_as_simulated(&text) } else { text };
@@ -71,7 +75,7 @@ pub fn run(
     let plot = bench.plot.write("Everett table", draw)?;
     let table = output.map(wrote);
     ui.result(&Table {
-        record: shown,
+        record: record.shown_as,
         grid,
         report: &identified.report,
         validation: validation.as_ref(),
@@ -113,7 +117,7 @@ impl Outcome for Table<'_> {
         let _ = writeln!(text, "{}: {}", self.record, self.report.summary());
         details(self.report, &mut text);
         if let Some(validation) = self.validation {
-            let _ = writeln!(text, "{}: {}", validation.record, predict::summary(validation));
+            let _ = writeln!(text, "{}: {}", validation.record, summary(validation));
         }
         text += &self.families;
         let _ = writeln!(text, "lines for the spec:\n[hysteresis]\ngrid = {}", self.grid);
@@ -121,31 +125,32 @@ impl Outcome for Table<'_> {
     }
 }
 
-fn validate(
-    path: &Path,
-    identified: &identify::Identification,
-    reading: &Reading,
-) -> Result<Prediction, Vec<Diagnostic>> {
-    let record = identify::read_record(path, &path.display().to_string(), reading)?;
-    identify::validate(&identified.table, &record, identified.report.dead_time)
-}
-
 /// The held-out error of every family, and its price.
-fn families(choice: &Choice, grid: usize) -> String {
+fn families(choice: &Choice, grid: usize, arbitrary: Option<&str>) -> String {
     if choice.scores.is_empty() {
         return String::new();
     }
     let mut text = String::from("leg model by cross-validation: whole curves held out, each without its mean\n");
-    let columns = [24, 14, 11, 14, 8].map(|width| right(width).behind("  "));
-    row(&mut text, &columns, &[&"model", &"held-out error", &"± std err", &"instructions", &"bytes"]);
+    let columns = [24, 14, 11, 14, 14, 8].map(|width| right(width).behind("  "));
+    row(&mut text, &columns, &[&"model", &"held-out error", &"± std err", &"arbitrary", &"instructions", &"bytes"]);
     for score in &choice.scores {
         let mark = if score.family == choice.family { "  <- chosen" } else { "" };
         let [held_out, error] =
             [score.held_out_rms, score.standard_error].map(|error| format!("{:.2} nm", error * 1e9));
+        let other = score.arbitrary_rms.map_or_else(|| "-".to_owned(), |rms| format!("{:.2} nm", rms * 1e9));
         let bytes = format!("{:>8}{mark}", score.family.bytes(grid));
-        row(&mut text, &columns, &[&score.family.name(), &held_out, &error, &score.family.instructions(), &bytes]);
+        row(
+            &mut text,
+            &columns,
+            &[&score.family.name(), &held_out, &error, &other, &score.family.instructions(), &bytes],
+        );
     }
-    text += "  chosen: the simplest within a fifth of the best; the table within one std err\n";
+    match arbitrary {
+        Some(name) => {
+            let _ = writeln!(text, "  chosen: the simplest within a tenth of the least error on {name}");
+        }
+        None => text += "  chosen: the simplest within a fifth of the best; the table within one std err\n",
+    }
     text += "  instructions of one leg on a Cortex-M7 in f64 are estimated, not measured\n";
     text
 }
