@@ -12,7 +12,7 @@ pub(super) fn account(cause: &Cause) -> String {
         _ => String::new(),
     };
     format!(
-        "mainly {}{which} (shares of the mean square: {}); linear drift removed: {:.2} nm rms",
+        "mainly {}{which} (shares of the mean square: {}); a linear drift of {:.2} nm rms was removed before",
         cause.main.name(),
         shares.join(", "),
         cause.drift_rms * 1e9

@@ -41,7 +41,7 @@ pub fn describe(design: &Design) -> String {
     let _ = writeln!(
         text,
         "  {:<12}{:>9}{:>8}{:>8}{:>16}{:>12}{:>22}",
-        "mode", "radius", "λ <", "gain ×", "delay, ticks", "settles, ms", "least damped"
+        "mode", "radius", "λ <", "gain ×", "delay, ticks", "τ max, ms", "least damped"
     );
     for one in &design.margins {
         let or =
