@@ -1,6 +1,6 @@
 //! The command line: arguments in, text or JSON out, exit code.
 //!
-//! Exit codes: 0 good; 1 the spec, a record or a budget fails, or an input cannot be read; 2 usage, or an output is an input;
+//! Exit codes: 0 good; 1 a spec, record, budget or gate is refused, or an input cannot be read; 2 usage, or an output is an input;
 //! 3 environment (a missing tool, a full disk, a file that cannot be written); 4 a simulated run ended before the end of its
 //! path; 130 interrupted by Ctrl-C, with the best result so far if there is one.
 
@@ -114,7 +114,8 @@ enum Command {
     Tune(tune::Arguments),
     /// Design active damping that is stable with every structural mode in [robust.structure], and write it into the spec.
     Design(design::Arguments),
-    /// Learn a repeated motion, simulated or on a machine: measure passes and compute the correction that cancels their error.
+    /// Learn a repeated motion, simulated or (with --port or --socket) on a machine, which is armed first and ramped down
+    /// afterwards: measure passes and compute the correction that cancels their error.
     Learn(learn::Arguments),
     /// Test the closed loop on corners and random draws of the declared uncertainties, for instance as a build gate.
     Robust(robust::Arguments),
@@ -132,7 +133,7 @@ enum Command {
     Gcs(gcs::Arguments),
     /// Replay a recording of a target on the host and compare every tick bit for bit; or export it as CSV or MCAP.
     Replay(replay::Arguments),
-    /// Compute M, C, G, J and leg forces at given states, with the controller's model.
+    /// Compute M, C ḣ, G, J and leg forces at given states, with the controller's model.
     Dynamics(dynamics::Arguments),
     /// Export the controller as a C library, a Python module or an FMU.
     Export(export::Arguments),

@@ -133,7 +133,7 @@ fn a_script_runs_a_wave_and_fetches_its_record() {
     run.says(1, &["not checked against a spec", "fast.toml: axis z (leg 2) would exceed the speed"]);
     let run = Run::of(&mut board.operate(&folder, &["wave wave.toml"]));
     run.says(1, &["wave.toml: not now; the machine must be running"]);
-    let run = Run::of(&mut board.operate(&folder, &["stop"]));
+    let run = Run::of(&mut board.operate(&folder, &["shutdown"]));
     run.says(1, &["the program of a board cannot be ended; `ramp-down` switches its amplifiers off"]);
     let run = Run::of(&mut board.operate(&folder, &["set gauge[0]=1"]));
     run.says(2, &["`gauge[0]` cannot be set; these can: command, selector"]);

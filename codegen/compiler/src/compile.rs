@@ -70,7 +70,7 @@ impl Compilation {
     }
 }
 
-/// All phases before the text: read, check, identify, lower.
+/// All phases before emission: reading, checks, stability, identification, set-points, lowering.
 ///
 /// # Errors
 /// The spec or a record is refused. Later phases run only if earlier ones accept, so a second run may find more.
@@ -102,6 +102,7 @@ fn run_phases(source: &SpecSource, findings: &mut Vec<Diagnostic>) -> Option<Com
     let setpoints = accept(setpoint::declared(&model, &source.dir), findings);
     let converters = accept(requirements::check(&model), findings);
     let ((margins, design), records, setpoints, ()) = (stability?, records?, setpoints?, converters?);
+    // A spec without `hysteresis.grid` takes that of its records.
     model.hysteresis.grid = records.grid(model.hysteresis.grid);
     findings.extend(records.warnings);
     findings.extend(design.iter().flat_map(|design| design.findings.clone()));
@@ -120,6 +121,7 @@ fn run_phases(source: &SpecSource, findings: &mut Vec<Diagnostic>) -> Option<Com
         accept(lower::lower(&model, task, &records.tables, &records.rate_tables, &records.around, origin), findings)?;
     let pose_noise = accept(lower::pose_noise(&model), findings)?;
     let rest_noise = accept(rest::noise(&model, design.as_ref()), findings)?;
+    // Again: the phases after `check_spec` have added findings.
     lint::allow(&model, findings);
     findings.extend(lint::unused(&model, findings));
     debug_assert!(findings.iter().all(|finding| finding.severity < Severity::Error));

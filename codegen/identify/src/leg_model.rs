@@ -1,16 +1,17 @@
-//! Leg models: families of models are fitted to one record, and the simplest good one is chosen.
+//! Leg models: families of models are fitted to the records of a leg, and the simplest good one is chosen.
 //!
 //! ```text
 //! P = Σ f_i(p_i) − A z + c₀        p_i: plays of the drive u, V;  dz = du (1 − s β z − γ |z|),  s = sign du
-//! P = G(h)                         read-out: a polynomial that rises over the travel;  P, h, y in µm
+//! P = G(h)                         read-out h = G⁻¹(P): G is a polynomial that rises over the travel;  P, h, y in µm
 //! y = h + c Σ L_j h                creep: L_j are first-order lags, time constants a decade apart, one weight c
 //! ```
 //! A family is a subset of these parts; an Everett table alone is the simplest family. All families are fitted by
 //! variable projection (Golub and Pereyra 1973): c, β, γ and the initial z are searched, and for each trial all other
-//! parameters are a non-negative least-squares solution. The initial creep states are free parameters, too. The fitted
+//! parameters are a least-squares solution in which the weights of the plays and A are non-negative. The initial creep states are free parameters, too. The fitted
 //! plays become a table: E(a, b) is the rise of Σ f_i when the drive goes from b to a.
 //!
-//! Families are compared by cross-validation: whole curves are held out, in folds. The simplest family within one
+//! If there is a record that no fit used, the simplest family whose error on it is within a tenth of the least, plus a
+//! fifth of the noise, is chosen. Otherwise families are compared by cross-validation: whole curves are held out, in folds. The simplest family within one
 //! standard error of the best is chosen. A family with plays or a Bouc-Wen state may also be worse by a tenth of the
 //! least error plus a fifth of the noise.
 
@@ -42,7 +43,8 @@ pub(crate) fn third(s: f64) -> f64 {
     (4.0 * s * s - 3.0) * s
 }
 
-/// Coefficients of x, x², … whose sum is nearest to `y`, and what is left of y; x rises to a positive value.
+/// Least-squares fit of `y` by a polynomial in `x` without constant: coefficients of x, x², …, and residual. `x` ascends
+/// to a positive last value.
 fn through_zero(x: &[f64], y: &[f64]) -> Option<([f64; READ_OUT], Vec<f64>)> {
     let unit = *x.last()?;
     let scaled: Vec<f64> = x.iter().map(|x| x / unit).collect();
@@ -157,7 +159,7 @@ impl Around {
     }
 
     /// The same leg with the displacement before its creep, h, multiplied by `gain`, plus `cubic` (share of the travel)
-    /// times the Chebyshev polynomial T₃ over the travel. Its table is multiplied by `gain`, too.
+    /// times T₃ + 1 over the travel (T₃: Chebyshev polynomial), so that h = 0 stays. Its table is multiplied by `gain`, too.
     ///
     /// # Errors
     /// As [`Self::validate`].

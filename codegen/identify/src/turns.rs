@@ -3,7 +3,8 @@
 //! Around a turn, creep, rate dependence and memory are smooth functions of the drive's distance from the turn; only a
 //! lag shifts the kink between them. On each side the displacement is fitted by a cubic polynomial of that distance,
 //! both with the same value at the turn. The distance is that of a drive behind a first-order lag, as an amplifier has
-//! it: such a drive turns later and less far, and after it the hysteresis starts from there.
+//! it. Such a drive turns later and at a smaller amplitude; the distance counts from that point, where the hysteresis of
+//! the next branch starts.
 
 use super::branches::Branch;
 use super::dead_time;
@@ -24,7 +25,7 @@ const TURNS: usize = 4;
 
 /// Largest standard error of an estimate from the turns, s.
 const USEFUL: f64 = 5e-5;
-/// Lag beside which the curvature is taken if there is none, s.
+/// Step for the curvature if the lag is 0, s.
 const NEAR: f64 = 1e-5;
 /// The lag (s) from the turns of the drive if its standard error is small enough, and a text that describes the decision.
 pub(super) fn estimate(record: &Record, branches: &[Branch]) -> Option<(f64, String)> {
@@ -51,7 +52,7 @@ fn lag(record: &Record, branches: &[Branch]) -> Option<[f64; 2]> {
     let squares = |lag: f64| turns.iter().try_fold(0.0, |sum, turn| Some(sum + turn.square(lag)?));
     let squares = |lags: &[f64]| lags.iter().map(|lag| squares(*lag)).collect::<Option<Vec<f64>>>();
     let found = dead_time::search(longest, squares)?;
-    // Of the parabola around the least one, or beside it if there is no lag.
+    // Variance 2 (S/free)/S″ by central differences around the least sum of squares S, or beside it if there is no lag.
     let lag = found.dead_time;
     let near = if lag > 0.0 { 0.1 * lag } else { NEAR };
     let middle = if lag > 0.0 { lag } else { near };

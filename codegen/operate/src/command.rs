@@ -25,7 +25,7 @@ const COMMANDS: &str = "status, arm, run, hold, ramp-down, acknowledge, none, se
                         move|jog AXIS=QUANTITY…, where, limits, can-i-go AXIS=QUANTITY… [speed=QUANTITY], frame [none | work|tool AXIS=QUANTITY…], mark NAME, goto NAME, \
                         play TRAJECTORY [correction=FILE machine=NAME], mode p|f|pf, gains [NAME=VALUE…], trigger LINE NAME=VALUE…, \
                         wait PHASE|arrived|SECONDS [TIMEOUT], config [code_min=CODE] [code_max=CODE], config write SPEC, \
-                        record arm [AFTER] | trigger | stop | look | download FILE, wave FILE | stop, on-edge [drop | move … | jog … | goto … | play … | wave FILE], watch [EVERY [SECONDS [FILE]]], stop";
+                        record arm [AFTER] | trigger | stop | look | download FILE, wave FILE | stop, on-edge [drop | move … | jog … | goto … | play … | wave FILE], watch [EVERY [SECONDS [FILE]]], shutdown";
 
 /// One command.
 #[derive(Debug, Clone, PartialEq)]
@@ -115,7 +115,7 @@ pub enum Command {
         file: Option<PathBuf>,
     },
     /// Ramp down and end the program that serves the link.
-    Stop,
+    Shutdown,
 }
 
 /// The requested frame of a session.
@@ -281,7 +281,10 @@ impl Command {
                 _ => return Err(format!("`{line}`: an edge can start {EDGE_STARTS}")),
             },
             ["watch", ref rest @ ..] if rest.len() <= 3 => Self::watch(rest)?,
-            ["stop"] => Self::Stop,
+            ["shutdown"] => Self::Shutdown,
+            ["stop"] => {
+                return Err("`stop`: `hold` stops the motion, `ramp-down` switches the amplifiers off, `shutdown` also ends the program at a socket".to_owned());
+            }
             _ => return Err(format!("invalid command `{line}`; expected one of: {COMMANDS}")),
         };
         Ok(Some(command))
@@ -399,7 +402,7 @@ mod tests {
             ("record arm 7", Some(Command::Record(RecorderAction::Arm { after: 7 }))),
             ("record download run.rec", Some(Command::Download("run.rec".into()))),
             ("wave stop", Some(Command::StopWave)),
-            ("stop", Some(Command::Stop)),
+            ("shutdown", Some(Command::Shutdown)),
             ("on-edge", Some(Command::Edge)),
             ("on-edge drop", Some(Command::DropEdge)),
             ("on-edge goto zero", Some(Command::OnEdge(Box::new(Command::Goto("zero".into()))))),

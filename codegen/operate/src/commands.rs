@@ -81,8 +81,8 @@ impl Source {
     }
 
     fn list(commands: Vec<Command>) -> Result<Self, Failure> {
-        if commands.iter().rev().skip(1).any(|command| *command == Command::Stop) {
-            return Err(Failure::Usage("`stop` ends the session: it must be the last command".to_owned()));
+        if commands.iter().rev().skip(1).any(|command| *command == Command::Shutdown) {
+            return Err(Failure::Usage("`shutdown` ends the session: it must be the last command".to_owned()));
         }
         Ok(Self::List(commands))
     }

@@ -74,7 +74,7 @@ impl MachineSource for OnLine<'_> {
         // Keep the result, even if the machine faulted.
         let result = match done {
             Ok(done) => Some(keep(done, ui)?),
-            Err(LearnError::Interruption) => None,
+            Err(LearnError::PassEnded) => None,
             Err(error) => return Err(down.err().unwrap_or_else(|| failure(&error, format!("{name}: {error}")))),
         };
         let final_state = format!("; {}", down?);

@@ -35,7 +35,7 @@ pub use machine::{LearnError, RepeatableMachine, error_by_tick, pass_timing};
 pub use modes::ModeMeasurement;
 pub use motion::Motion;
 pub use observation::PassObservation;
-pub use passes::{Ending, LearningResult, Pass, learn, translation_nm};
+pub use passes::{Ending, LearningResult, Pass, learn, measured_translation_nm};
 pub use plan::Plan;
 pub use refusal::{NOWHERE, larger_limit, largest_correction, takes_correction};
 pub use response::{Bin, Response};

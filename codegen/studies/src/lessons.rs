@@ -201,7 +201,7 @@ impl MachineSource for SimulatedMachine<'_> {
         bench.arm(ARMING).map_err(gate)?;
         let result = match work(&mut bench, ui) {
             Ok(done) => Some(keep(done, ui)?),
-            Err(LearnError::Interruption) => None,
+            Err(LearnError::PassEnded) => None,
             Err(error) => return Err(gate(error)),
         };
         Ok(SessionResult { result, reason: None, final_state: String::new() })

@@ -139,6 +139,7 @@ impl<'m, G: Gauges, A: Amplifiers, L: Lines> Board<'m, G, A, L> {
         let restart = acknowledged && !report.amplifier_on;
         let request = match command.request {
             _ if restart => Request::None,
+            // The background is dead, and with it the host's access.
             _ if *orphaned => Request::RampDown,
             asked => asked,
         };
@@ -150,7 +151,7 @@ impl<'m, G: Gauges, A: Amplifiers, L: Lines> Board<'m, G, A, L> {
         let sampled = now();
         let begun = self.gauges.begin();
         let mut events = core::mem::take(&mut self.carried);
-        // While the gauges are converted.
+        // Read-back of the DACs, while the gauges are converted.
         self.try_amplifiers(report, A::ask);
         for (happened, event) in [
             (noticed.missed > 0, MISSED_TICK),
@@ -175,14 +176,14 @@ impl<'m, G: Gauges, A: Amplifiers, L: Lines> Board<'m, G, A, L> {
             }
         };
 
-        // Sampled with the gauges; the supervisor does not use it.
+        // The trigger input, sampled with the gauges. The supervisor ignores its edge.
         let rose = triggers::INPUT
             && source.pending.sense(self.lines.input().map_err(|fault| {
                 report.converter(fault);
                 self.carried |= CONVERTER;
             }));
         let seen = if rose { events | EDGE } else { events };
-        let input = take(&mut self.input, command, &readings, request, seen);
+        let input = store_input(&mut self.input, command, &readings, request, seen);
         let output = exchange::step(config, self.machine, input);
 
         // Off before the codes change; on only after they are written.
@@ -191,7 +192,7 @@ impl<'m, G: Gauges, A: Amplifiers, L: Lines> Board<'m, G, A, L> {
         }
         self.codes = Some(output.tick.dac_code);
         self.try_amplifiers(report, |amplifiers| amplifiers.write(&output.tick.dac_code));
-        self.show(report, triggers::lines(output.tick.status));
+        self.set_trigger_lines(report, triggers::lines(output.tick.status));
         report.record_output(now().wrapping_sub(sampled));
         // Never enable the amplifiers while a converter has not started, whatever the supervisor says.
         if output.amplifier_on && self.started {
@@ -219,7 +220,7 @@ impl<'m, G: Gauges, A: Amplifiers, L: Lines> Board<'m, G, A, L> {
             source.keep_pass(&self.machine.state, output.tick.status, &mut command.command);
         }
         if let Some(samples) = &mut exchange.samples {
-            // Missed ticks count, too.
+            // Time in ticks, missed ones included; `stand_by` and `tick` have counted this one.
             let due = exchange.report.tick + u64::from(exchange.report.missed);
             samples.keep(due - 1, self.machine, &output);
         }
@@ -235,7 +236,7 @@ impl<'m, G: Gauges, A: Amplifiers, L: Lines> Board<'m, G, A, L> {
         if let Some(codes) = self.codes {
             self.try_amplifiers(report, |amplifiers| amplifiers.write(&codes));
         }
-        self.show(report, 0);
+        self.set_trigger_lines(report, 0);
         report.tick += 1;
         report.missed = report.missed.saturating_add(noticed.missed);
         for (happened, event) in [(noticed.stop, STOP), (noticed.amplifier, AMPLIFIER)] {
@@ -248,9 +249,9 @@ impl<'m, G: Gauges, A: Amplifiers, L: Lines> Board<'m, G, A, L> {
         }
     }
 
-    /// Sets the output lines; a fault is an event of the next tick.
+    /// Sets the trigger lines; a fault is an event of the next tick.
     #[inline]
-    fn show(&mut self, report: &mut Report, high: u32) {
+    fn set_trigger_lines(&mut self, report: &mut Report, high: u32) {
         if triggers::LINES != 0 {
             if let Err(fault) = self.lines.set(high) {
                 report.converter(fault);
@@ -281,7 +282,7 @@ impl<'m, G: Gauges, A: Amplifiers, L: Lines> Board<'m, G, A, L> {
 
 /// Writes the tick's input to `slot`. It has its own stack frame, which is released before the law needs the stack.
 #[inline(never)]
-fn take<'a>(
+fn store_input<'a>(
     slot: &'a mut Option<MachineInput>,
     command: &TickCommand,
     readings: &[Real; CHANNELS],

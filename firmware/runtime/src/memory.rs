@@ -166,6 +166,7 @@ impl<T: Real, const CAP: usize> ReversalMemory<T, CAP> {
             self.push(table);
         }
         self.displacement = if rising {
+            // A pair ends with its maximum, p₁ or later.
             while self.len >= 3 && drive >= self.extremum(self.len - 2) {
                 self.len -= 2;
             }
@@ -173,6 +174,7 @@ impl<T: Real, const CAP: usize> ReversalMemory<T, CAP> {
             let line = table.rising(self.extremum(top), table.cell(drive));
             self.displacement_at(top) + line.at::<true>(drive)
         } else {
+            // p₀ belongs to no pair; reaching it is handled below.
             while self.len >= 4 && drive <= self.extremum(self.len - 2) {
                 self.len -= 2;
             }
@@ -305,26 +307,28 @@ impl<T: Real, const CAP: usize> ReversalMemory<T, CAP> {
     }
 
     /// Applies a drive if it lies on the segment of a branch and wipes out the same extrema as the solution. Returns
-    /// whether both hold; if not, nothing has changed.
+    /// whether it is now applied; if not, nothing has changed.
     #[inline(always)]
     fn apply_on_segment<const RISING: bool, G: Grid<T>>(&mut self, table: &G, branch: &Branch<T>, drive: T) -> bool {
         let Branch { top, at_start, line } = *branch;
         let onward = if RISING { drive > self.drive } else { drive < self.drive };
-        // If the memory is full, a new extremum may drop another.
+        // Nothing to apply if the drive stays. If the memory is full, a new extremum may drop another: not here.
         if !onward || !line.holds(drive) || self.len >= table.capacity(CAP) {
             return drive == self.drive;
         }
         // The drive must leave the loops that the solution leaves. It does if it leaves the outermost of them.
         if top + 1 < self.len {
             let inner = self.extremum(top + 1);
-            if if RISING { drive < inner } else { drive > inner } {
+            let falls_short = if RISING { drive < inner } else { drive > inner };
+            if falls_short {
                 return false;
             }
         }
         // It must not leave more loops. A fall from the first maximum p₁ can: at p₀ it wipes out everything.
         if top >= if RISING { 2 } else { 1 } {
             let bound = self.extremum(top - 1);
-            if if RISING { drive >= bound } else { drive <= bound } {
+            let goes_beyond = if RISING { drive >= bound } else { drive <= bound };
+            if goes_beyond {
                 return false;
             }
         }
@@ -446,7 +450,8 @@ impl<T: Real, const CAP: usize> ReversalMemory<T, CAP> {
     /// Drops the pair of neighbouring extrema with the smallest effect.
     ///
     /// Without p_i and p_{i+1}, every later displacement changes by the Everett rectangle of the four neighbours, w_i =
-    /// E(p_{i−1}, p_i) − E(p_i, p_{i+1}) + E(p_{i+1}, p_{i+2}) − E(p_{i−1}, p_{i+2}) in absolute value. The pair with
+    /// E(p_{i−1}, p_i) − E(p_i, p_{i+1}) + E(p_{i+1}, p_{i+2}) − E(p_{i−1}, p_{i+2}) in absolute value, with the larger argument
+    /// of each E as its first. The pair with
     /// the smallest w is dropped; p₀ stays. Dropping the innermost loop instead gave errors up to 3.9 µm. Three of the
     /// four terms are differences of stored displacements.
     #[cold]

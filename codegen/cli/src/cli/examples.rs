@@ -182,7 +182,8 @@ Commands: status, arm, run, hold, ramp-down, acknowledge, none,
   config [code_min=CODE] [code_max=CODE], config write SPEC,
   record arm [AFTER] | trigger | stop | look | download FILE, wave FILE | stop,
   on-edge [drop | move … | jog … | goto … | play … | wave FILE],
-  watch [EVERY [SECONDS [FILE]]], stop (ends the program at a socket)
+  watch [EVERY [SECONDS [FILE]]], shutdown (ramps down, ends the program
+  at a socket)
 docs/operate.md explains them. `none` ends a request, so that it can be given
 again; `acknowledge` clears a fault; `can-i-go` names the limit that prevents it.
 

@@ -71,7 +71,7 @@ pub struct SizeArguments {
     /// The function that computes one tick; found automatically in images of specgen.
     #[arg(long, value_name = "SYMBOL")]
     tick: Option<String>,
-    /// The core has no double-precision FPU: a tick must not use f64.
+    /// Fail if a tick uses f64: for a core without double-precision FPU.
     #[arg(long)]
     single: bool,
 }

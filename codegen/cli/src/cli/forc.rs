@@ -30,8 +30,8 @@ pub struct Arguments {
     /// rates.
     #[arg(long, value_name = "V/S", allow_negative_numbers = true, value_parser = number("", "a slope from 0.1 to 100000 V/s", 0.1..=1e5))]
     rate: Option<f64>,
-    /// Also write a set of 4 curves at 32 times the rate (FILE-fast) and a random drive of 10 s (FILE-arbitrary):
-    /// `identify` separates creep from rate dependence with them.
+    /// Write three records: the curves, 4 curves at 32 times the rate (leg-fast.csv for -o leg.csv) and 10 s of random drive
+    /// (leg-arbitrary.csv). From these `identify` separates creep from rate dependence.
     #[arg(long)]
     two_rates: bool,
     /// Write only the drive signal, for a waveform generator: 0 V to the lowest voltage, one second there, then the curves.

@@ -69,15 +69,16 @@ struct EverettArguments {
     /// Dead time from the drive column to the displacement, ms; estimated if not given and the record shows it.
     #[arg(long, value_name = "MS", value_parser = number("", "milliseconds from 0 to 10", 0.0..=10.0), allow_negative_numbers = true)]
     dead_time: Option<f64>,
-    /// Leg model: auto compares the families on curves that are held out; or preisach, bouc-wen, generalized-plays, plays, bouc-wen-plays.
+    /// Leg model: preisach, bouc-wen, generalized-plays, plays, bouc-wen-plays; or auto: one of these, chosen by
+    /// cross-validation or by the error on --validate.
     #[arg(long, value_name = "MODEL", value_parser = model, default_value = "preisach")]
     model: LegModelKind,
-    /// Another record of the leg, not used in the fit, to validate the table; with --model auto the model with the least
-    /// error on it is chosen.
+    /// Another record of the leg, not used in the fit. It validates a table; with --model auto it selects the model: the
+    /// simplest whose error on it is within a tenth of the least.
     #[arg(long, value_name = "RECORD")]
     validate: Option<InputFile>,
-    /// Write the table to this file (CSV: up_V, down_V, everett_um). With --spec: the folder for six tables, leg1.csv to
-    /// leg6.csv, within that of the spec.
+    /// Write the table to this file (CSV: up_V, down_V, everett_um). With --spec: the folder for six tables, leg1.csv
+    /// (leg 0) to leg6.csv (leg 5), relative to that of the spec.
     #[arg(short, long, value_name = "FILE|DIR")]
     output: Option<OutputFileOrFolder>,
     #[command(flatten)]
@@ -217,7 +218,7 @@ struct BenchArguments {
     /// columns are found by their headers.
     #[arg(long, value_name = "NAME=COLUMN,…", value_delimiter = ',')]
     columns: Vec<String>,
-    /// Sampling rate, Hz: time is computed from sample numbers, or from row numbers.
+    /// Sampling rate, Hz: time is computed from the column `sample`, or else from row numbers.
     #[arg(long, value_name = "HZ", value_parser = number("Hz", "samples per second above zero", 1e-3..=1e9), allow_negative_numbers = true)]
     rate: Option<f64>,
     #[command(flatten)]

@@ -34,7 +34,7 @@ pub struct Arguments {
     #[arg(long, value_name = "N", default_value_t = 5, allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(0..=1000))]
     passes: u32,
     /// Highest frequency to learn, Hz; lowered until learning converges on every machine within [robust]. With --excite, the
-    /// sweeps reach 1.6 times this frequency, or 0.4 times the knots per second if that is lower.
+    /// sweeps reach 1.6 times this frequency, or 0.4 times the knots (samples of the correction) per second if that is lower.
     #[arg(long, value_name = "HZ", value_parser = number("Hz", "a frequency from 0.001 to 4000 Hz", 1e-3..=4e3), allow_negative_numbers = true, default_value_t = BANDWIDTH)]
     bandwidth: f64,
     /// Range of an uncertainty, instead of that of [robust] or the default: `stiffness=2%`, `gain=0.9:1.1`, `delay_ticks=0`.

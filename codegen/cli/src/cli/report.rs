@@ -19,7 +19,7 @@ pub struct Arguments {
     /// Also write `<output>-paper.html`, with the paper's figures and tables.
     #[arg(long)]
     paper: bool,
-    /// With --paper: generations of the genetic algorithm, 100 strings each; 0 to skip it.
+    /// With --paper: generations of the genetic algorithm, 100 candidates each; 0 to skip it.
     #[arg(long, default_value_t = 10, allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(0..=10_000))]
     generations: u32,
     /// Report about this recorded run instead, compared with a simulation of the same commands.

@@ -15,7 +15,7 @@ pub struct Arguments {
     /// Folder for reproduction.md, reproduction.csv, reproduction.json and convergence.csv.
     #[arg(short, long, value_name = "DIR", default_value = "reproduction")]
     output: OutputFolder,
-    /// Generations of the genetic algorithm of Table 3, 100 strings each.
+    /// Generations of the genetic algorithm of Table 3 of the paper, 100 candidates each.
     #[arg(long, default_value_t = 50, allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     generations: u32,
     /// Plot the cost of the genetic algorithm by generation.

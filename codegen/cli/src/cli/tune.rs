@@ -33,8 +33,8 @@ pub struct Arguments {
     /// Candidates per generation; 100 (Table 3) for the genetic algorithm or 20 for CMA-ES if not given.
     #[arg(long, allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(4..=100_000))]
     population: Option<u32>,
-    /// Trajectory used for tuning. The result is also scored on a trajectory that was not used: case 1 (six legs: leg), or the
-    /// multisine after tuning on one of these.
+    /// Trajectory used for tuning. The result is also scored on one that tuning did not use: case-1 (without [control]: leg),
+    /// or multisine if that one was used for tuning.
     #[arg(long, value_enum, default_value = "multisine")]
     trajectory: TrajectoryArgument,
     /// Highest frequency of the multisine, or operating frequency of the paper's trajectory, Hz.
@@ -49,8 +49,8 @@ pub struct Arguments {
     /// Additional delay, in ticks, at which a candidate must still be stable; for a spec with [control].
     #[arg(long, default_value = "0.5", value_parser = number("", "a number of ticks from 0 to 5", 0.0..=5.0), allow_negative_numbers = true)]
     delay_margin: f64,
-    /// Bounds of a parameter group, such as `ki=10:1000`: kp, ki (1/s) and kv relative to the stiffness of the axis; level and
-    /// drift in rad/s with [control], as weights without.
+    /// Bounds of a parameter group, such as `ki=10:1000`: kp, ki (1/s) and kv (s), relative to the stiffness of the axis; level and
+    /// drift: rad/s with [control], otherwise weights per tick.
     #[arg(long, value_name = "GROUP=LOW:HIGH", value_parser = bounds)]
     bounds: Vec<GivenBounds>,
     /// With [control]: extra delay from controller to amplifiers, in control intervals.

@@ -164,7 +164,7 @@ fn one_that_never_returns_is_not_waited_for(site: &Site) {
 /// `operate stop` takes effect while another host is in control, and returns when the program has ended.
 fn client_without_control_stops_the_program(site: &Site, running: ProcessGuard) {
     let kept = ControllingHost::new(site.run());
-    let stopped = site.operate(&["stop"]).status().unwrap();
+    let stopped = site.operate(&["shutdown"]).status().unwrap();
     assert!(stopped.success() && !site.link.exists(), "{stopped}");
     let output = running.wait();
     let summary: Value = serde_json::from_slice(&output.stdout).unwrap();

@@ -259,7 +259,7 @@ fn pages_operate_a_machine_one_is_in_control_and_a_page_that_leaves_is_a_host_th
     });
     first.done(json!({ "do": "restore" }));
     first.wait("the gains of the spec", |state| state["known"]["differ"] == json!([]));
-    for line in ["config write x.toml", "record download /tmp/x", "stop", "wait 5", "fly"] {
+    for line in ["config write x.toml", "record download /tmp/x", "shutdown", "stop", "wait 5", "fly"] {
         assert_eq!(first.line(line)["ok"], false, "{line}");
     }
     garbage_disturbs_nothing(&panel, &mut first);

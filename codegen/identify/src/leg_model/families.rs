@@ -25,8 +25,8 @@ use specgen_language::model::LegModelKind as Kind;
 const SAMPLES: usize = 12_000;
 /// Branches shorter than this share of the range are not scored: they show how the record began.
 const SCORED: f64 = 0.1;
-/// Share of the least error by which a simpler family other than the table may be worse, and share of the gauge's noise:
-/// held-out errors near the noise differ by less than motion shows.
+/// A family other than the table may be worse than the best by this share of the least error plus this share of the
+/// gauge's noise: such a difference does not show in motion.
 const WORTHWHILE: [f64; 2] = [0.1, 0.2];
 /// Fewer folds give no estimate of the spread.
 const FEWEST_FOLDS: usize = 3;
@@ -70,7 +70,8 @@ pub fn choose(
     options: &crate::Options,
     kind: Kind,
 ) -> Result<Choice, Vec<Diagnostic>> {
-    // A table has a weight for each of its cells, so those that are compared with leg models stay coarse.
+    // A table has a weight for each of its cells. For a fair comparison it gets no more cells per axis than the other
+    // families have plays.
     let dead_time = if options.dead_time == DeadTime::Estimate { DeadTime::FromTurns } else { options.dead_time };
     let coarse =
         crate::Options { grid: if options.grid > PLAYS { PLAYS } else { options.grid }, dead_time, ..*options };
@@ -128,7 +129,8 @@ fn chosen(
         let help = "write hysteresis.model = \"preisach\", or record curves that turn back at more voltages";
         return findings.refuse(codes::GRID_NOT_CHOSEN, None, message, help);
     }
-    // A lag that was found at the turns also cuts them off; any other dead time only shifts the displacement.
+    // A first-order lag, found where the drive turns, also rounds the turns; any other dead time only shifts the
+    // displacement.
     let delay = table.report.dead_time;
     let turned = delay > 0.0 && table.report.lag_of_turns;
     let late = turned.then(|| Record { drive: dead_time::lagged(record, delay), ..record.clone() });
@@ -162,7 +164,8 @@ fn chosen(
         let held_out_rms = mean(&candidate.squares).sqrt() * 1e-6;
         let standard_error = error * 1e-6;
         scores.push(FamilyScore { family: candidate.family, held_out_rms, standard_error, arbitrary_rms });
-        // The table has to be as good as the others; among these the price decides.
+        // By cross-validation: within one standard error of the best; families other than the table also within
+        // `worthwhile`. The first in the order of `Family::all`, the simplest, is taken.
         let slack = if candidate.family.kind == Kind::Preisach { 0.0 } else { worthwhile };
         let good = match least {
             Some(least) => arbitrary_rms.is_some_and(|rms| rms <= (1.0 + WORTHWHILE[0]) * least + noise),
@@ -357,7 +360,7 @@ fn terms(creep: f64) -> Vec<[f64; 2]> {
     if creep > 0.0 { TIMES.map(|tau| [tau, creep]).to_vec() } else { Vec::new() }
 }
 
-/// The solution as a table and what is around it; none if it cannot be inverted.
+/// The solution as a table and the parameters beside it; none if it cannot be inverted.
 fn model_of(problem: &Problem, solution: &Solution, plane: &Plane) -> Option<LegModel> {
     let Problem { family, unit, .. } = *problem;
     let (weights, taken, constant, read_out) = problem.parts(&solution.values);

@@ -39,7 +39,7 @@ pub(super) struct Samples {
     pub(super) branch: Vec<Option<usize>>,
     /// First sample of each further record.
     pub(super) parts: Vec<usize>,
-    /// Whether the first sample is at rest: its displacement ties the read-out.
+    /// Whether the first sample is at rest. The offset of the model is then chosen to meet it.
     pub(super) at_rest: bool,
     /// Of each step and time constant: what remains of a state, and the share of the last and the present h.
     steps: Vec<[[f64; 3]; TIMES.len()]>,
@@ -120,7 +120,7 @@ impl Samples {
         all
     }
 
-    /// y of an h that begins each record at rest at 0.
+    /// The residual of y that a residual `h` before the creep causes; creep states begin at 0 in each record.
     pub(super) fn with_creep(&self, c: f64, h: &[f64]) -> Vec<f64> {
         let mut states = [0.0; TIMES.len()];
         let mut all = vec![h[0]];
@@ -217,7 +217,8 @@ impl<'a> Problem<'a> {
         let mut states: Vec<f64> = r.iter().map(start).collect();
         let starts = if family.creeps() && !family.floats() { STARTS } else { 0 };
         let bounded = r.len() * if family.is_cubic() { 3 } else { 1 };
-        // Of each record the start of its creep; of further ones also an offset.
+        // Initial creep states of each record, and an offset of further ones. Not with free offsets of the branches, which
+        // absorb both. Plays and z run on: a record begins at rest, where the one before it ended.
         let starts_of = |part: usize| if part == 0 { starts } else { starts + usize::from(starts > 0) };
         let records = samples.parts.len() + 1;
         let width = bounded + 1 + (0..records).map(starts_of).fold(0, |sum, own| sum + own);

@@ -282,7 +282,7 @@ impl<P: Port> Operator<P> {
             _ => {
                 self.ask(command)?;
                 self.note(&line, &Acknowledgement("done".to_owned()), ui);
-                if *command == Command::Stop {
+                if *command == Command::Shutdown {
                     return self.stopped(ui);
                 }
             }
@@ -312,7 +312,7 @@ impl<P: Port> Operator<P> {
             Command::Trigger { line, settings } => self.set_trigger(*line, settings)?,
             Command::Wave(path) => self.wave(path, false)?,
             Command::StopWave => self.session.stop_wave()?,
-            Command::Stop => {
+            Command::Shutdown => {
                 self.is_stopping = true;
                 self.session.stop().map_err(unsupported)?;
             }

@@ -14,7 +14,7 @@ use specgen_runtime::learning::Settings;
 use specgen_runtime::pass::{Course, Stage};
 use specgen_runtime::playback::Knot;
 use specgen_runtime::setpoint::BUSY;
-use specgen_studies::learning::{Table, translation_nm};
+use specgen_studies::learning::{Table, measured_translation_nm};
 
 use super::answer::Acknowledgement;
 use super::error::SessionError;
@@ -106,7 +106,7 @@ impl<P: Port> Operator<P> {
         if !coverage.is_whole() {
             return Err(SessionError::Fault(format!("the pass ended early, after {coverage}: its error is unknown")));
         }
-        let error_nm = translation_nm(motion);
+        let error_nm = measured_translation_nm(motion);
         self.note(line, &PassReport { correction: shown(path), error_nm, coverage, status: passed.status }, ui);
         Ok(())
     }

@@ -93,7 +93,7 @@ impl<P: Port> LinkedMachine<'_, P> {
     /// Keeps the error that ended a pass.
     pub fn ended(&mut self, error: SessionError) -> LearnError {
         self.error = Some(error);
-        LearnError::Interruption
+        LearnError::PassEnded
     }
 }
 

@@ -132,7 +132,7 @@ impl Excitation {
         let mut pairs = Vec::with_capacity(PASSES);
         for (number, knots) in self.passes.iter().enumerate() {
             if watch(number).is_break() {
-                return Err(LearnError::Interruption);
+                return Err(LearnError::PassEnded);
             }
             let seen = require_unlimited(require_followed(machine.pass(motion, knots, self.spacing)?)?)?;
             let correction = correction_by_tick(knots, motion, self.spacing).into_iter();

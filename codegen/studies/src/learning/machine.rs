@@ -21,7 +21,7 @@ const LEGS: u32 = 0x3f;
 /// Status bit for a limited correction.
 pub(super) const CORRECTION_LIMITED: u32 = 1 << 20;
 
-/// Reasons learning is refused.
+/// Why a pass or learning failed.
 #[derive(Debug)]
 pub enum LearnError {
     /// The simulated machine cannot make a pass.
@@ -31,7 +31,7 @@ pub enum LearnError {
     /// Limits restricted the excitation; the status bits.
     Limited(u32),
     /// The user or the machine stopped a pass. The machine's driver holds the reason.
-    Interruption,
+    PassEnded,
     /// The device refuses the plan.
     Refused,
 }
@@ -52,7 +52,7 @@ impl fmt::Display for LearnError {
                  control.correction",
                 status_words(*status)
             ),
-            Self::Interruption => f.write_str("the machine ended a pass"),
+            Self::PassEnded => f.write_str("a pass was ended by the user or the machine"),
             Self::Refused => f.write_str("the device refuses this learning plan"),
         }
     }
@@ -102,7 +102,7 @@ impl RepeatableMachine for Bench<'_> {
         debug_assert!(accepted, "{timing:?}");
         let mut real = Vec::with_capacity(motion.targets.len());
         let mut status = 0;
-        self.lose_mains_phase(motion.targets[0])?;
+        self.shift_mains_phase(motion.targets[0])?;
         for target in &motion.targets {
             let correction = player.give().map_or([0.0; 6], |played| played.correction);
             let tick = self.tick(&Request { correction, ..Request::stream(*target) })?;

@@ -16,16 +16,16 @@ use super::observation::PassObservation;
 
 /// Ratio of an error to the smallest one above which the error counts as growing.
 const GROWTH: f64 = 1.5;
-/// Smallest fraction of an update that the host applies; each worse pass halves the fraction. A smaller step converges with a larger error
-/// of the response, such as another slope of the hysteresis.
+/// Smallest fraction of an update that the host applies; each worse pass halves the fraction. A smaller step still
+/// converges if the assumed response is further off, for instance at another slope of the hysteresis.
 const SMALLEST_STEP: f64 = 0.25;
 
 /// Errors of a pass, over the motion itself.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Pass {
-    /// Rms true error of the translation as a norm, nm.
+    /// Rms error of the translation as a norm, nm: of the true pose in simulation, of the measured one on a machine.
     pub translation_nm: f64,
-    /// Rms true error of the angles as a norm, nrad.
+    /// The same of the angles, nrad.
     pub orientation_nrad: f64,
     /// Rms measured error of both, with angles times the joint radius, nm: the criterion.
     pub measured_nm: f64,
@@ -77,7 +77,7 @@ fn measured_nm(errors: &[[f64; 6]], motion: &Motion) -> f64 {
 
 /// Rms error of the translation as a norm, nm, from the recorded errors of a pass.
 #[must_use]
-pub fn translation_nm(errors: &[Knot]) -> f64 {
+pub fn measured_translation_nm(errors: &[Knot]) -> f64 {
     let squares = errors.iter().flat_map(|knot| &knot[..3]).map(|value| f64::from(*value) * f64::from(*value));
     libm::sqrt(squares.sum::<f64>() / errors.len() as f64) * UNIT * 1e9
 }
@@ -90,11 +90,11 @@ pub enum Ending {
     AllPasses,
     /// The last pass was worse than the best one by more than the noise, or two consecutive passes were not better by more than the noise.
     NoGain,
-    /// The error of the last pass was at least half as large again as that of the best one.
+    /// The error of the last pass was more than 1.5 times that of the best one.
     Growth,
     /// The user stopped it.
     Interruption,
-    /// The machine ended a pass.
+    /// A pass was ended from outside, or the machine refused the final correction.
     Machine,
 }
 
@@ -204,7 +204,7 @@ impl Progress<'_> {
 
 /// Makes up to `count` passes after the first and learns from each.
 ///
-/// - The first pass and the two before it have the correction `initial`; no knots means no correction. Those two do not count: one brings the
+/// - The first pass and the two before it (one if `count` is 0) have the correction `initial`; no knots means no correction. Those two do not count: one brings the
 ///   hysteresis into the state of every repetition, the other shows the noise, the difference between repetitions.
 /// - A correction is kept if its pass is better than the best one before it by more than the noise of both, and not worse than the first
 ///   pass in translation or angles.
@@ -247,7 +247,7 @@ pub fn learn(
         }
         match progress.advance(machine) {
             // The pass was ended: return what was learned so far.
-            Err(LearnError::Interruption) => return Ok(LearningResult { ending: Ending::Machine, ..result }),
+            Err(LearnError::PassEnded) => return Ok(LearningResult { ending: Ending::Machine, ..result }),
             advanced => advanced?,
         }
         let pass = Pass::of(progress.last(), motion)?;

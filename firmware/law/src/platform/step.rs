@@ -8,21 +8,22 @@
 //! learn      e = N(h_d(t_n) − h) ;  s ← s + T_s k_I e                        (7), held where it would wind up
 //!            ν = N(Y − (q̂ − p) − δ̂ − φ̂) ;  δ̂, φ̂ ← ν                        (AII.3), (AII.5), (AII.6), in modal coordinates
 //! setpoint   h_d, ḣ_d, ḧ_d at t_{n+1}
-//! load       p = (J⁻ᵀ(M ḧ_d + C ḣ_d + G + K_e (h_d − h_e)) − f_rest)/k_a      known deflection of the legs, (7)
+//! load       p = (J⁻ᵀ(M ḧ_d + C ḣ_d + G − F_int) − f_rest)/k_a                 known deflection of the legs, (7)
 //!            + J⁻ᵀ k_v ė/k_a + τ (Δl(h_d(t_{n+1})) − Δl(h_d(t_n)))/T_s                damping, lead
 //! legs       q = Δl(h_d) + p + J⁻ᵀ(k_p e + s)/k_a − δ̂ − φ̂ ;  u = Γ⁻¹(q)       limited: q̂ is q within the limits
 //! ```
-//! N is the modal notch, T_s the period. Two further terms of q are J c of a correction c that was learned or prepared
+//! N is the modal notch, T_s the period. F_int is the wrench of the work piece on the platform: K_e (h_e − h_d), or
+//! measured. Two further terms of q are J c of a correction c that was learned or prepared
 //! for the motion (`specgen_runtime::correction`), and J V D(z) V⁻¹ (h_d − h) of active damping
 //! (`specgen_runtime::damping`).
 //!
 //! The innovation ν compares Y with q̂ − p, because the load p deflects the legs. Lead, k_v, active damping and
 //! correction are no loads, but ν leaves them out in the same way. The feedback f = J⁻ᵀ(k_p e + s)/k_a stays in ν.
 //!
-//! Y = Δl(h) is linearised about the set-point, Δl(h_d) − J e. With the offset b of a change of mode and the part
-//! w = q − q̂ that limits withhold, q = Δl(h_d) + p + f − δ̂ − φ̂ + b gives ν = N(w − b − f − J e). This form does not
+//! Y = Δl(h) is linearised about the set-point, Δl(h_d) − J (h_d − h). With the offset b of a change of mode and the part
+//! w = q − q̂ that limits withhold, q = Δl(h_d) + p + f − δ̂ − φ̂ + b gives ν = N(w − b − f − J (h_d − h)). This form does not
 //! subtract large numbers. It neglects the error times the change of J over the workspace, about a thousandth of the
-//! error, and the rounding of the converter on a free leg.
+//! error, and the rounding of the converter on a leg that no limit holds back.
 //!
 //! δ̂ and φ̂ are in modal coordinates, as N is. The law has equal weights on all legs, so it is the same in both
 //! coordinates, and one map takes feedback and estimates to the legs: J⁻ᵀF/k_a − δ̂ − φ̂ = J V (V⁻¹K⁻¹F − δ̂ − φ̂).
@@ -64,6 +65,7 @@ pub fn advance<P: Platform>(
     if gauge_faults == 0 {
         learn(p, config, state);
     } else {
+        // Without a pose the damping gets no error, and its request decays.
         state.damping.update(p.damping(), &[P::Real::ZERO; 6]);
     }
     let wrench_valid = take_wrench(p, config, state, &input.wrench);
@@ -81,6 +83,7 @@ pub fn advance<P: Platform>(
     if p.lead() == P::Real::ZERO && p.own_leads().is_empty() {
         state.load = load;
     } else {
+        // A trajectory that ends in this tick still has its own lead.
         let lead = lead(p, trajectory_before.or(state.generator.plays()));
         state.load = each(|leg| load[leg] + (demand[leg] - state.demand[leg]) * lead);
     }
@@ -126,7 +129,7 @@ fn lead<P: Platform>(p: P, trajectory: Option<u32>) -> P::Real {
 }
 
 /// Whether this tick is the first of its mode, or of its source of the interaction force. If so, the parts that the
-/// mode does not use are reset. The first request then sets the offset that keeps the voltages unchanged.
+/// mode does not use are reset, and the integral where the estimates begin. The first request then sets the offset that keeps the voltages unchanged.
 #[inline]
 fn enter_mode<P: Platform>(p: P, config: &Config<P>, state: &mut State<P>) -> bool {
     let (mode, interaction) = (config.mode, config.interaction);
@@ -139,6 +142,7 @@ fn enter_mode<P: Platform>(p: P, config: &Config<P>, state: &mut State<P>) -> bo
         Some(before) => before.law() != Law::Invhys,
         None => false,
     };
+    // The estimates begin: the offset takes over what the integral held.
     if mode.law() != Law::Invhys && !adapted {
         state.integral = Integral::new();
         state.deflection = [P::Real::ZERO; 6];
@@ -220,7 +224,7 @@ fn weaken<T: Real>(fallback: Fallback, values: &mut [T; 6]) {
 
 /// When the set-point comes to rest, the estimates take over the integral; the request stays the same. Otherwise both
 /// would drift against each other, since they act on the same error: the estimates take over the integral's deflection
-/// at their rate, and the integral releases it at another, k_I/(1 + k_p).
+/// at their rate, and the integral releases it at another, k_I/(K + k_p) on an axis of stiffness K.
 #[cold]
 fn integral_to_estimates<P: Platform>(p: P, config: &Config<P>, state: &mut State<P>) {
     let mode = config.mode;

@@ -238,7 +238,7 @@ impl<'a> Bench<'a> {
     ///
     /// # Errors
     /// As [`Bench::tick`].
-    pub fn lose_mains_phase(&mut self, at: PoseTarget) -> Result<(), RunError> {
+    pub fn shift_mains_phase(&mut self, at: PoseTarget) -> Result<(), RunError> {
         /// Inverse of the golden ratio: its multiples are spread evenly.
         const SPREAD: f64 = 0.618_033_988_749_894_9;
         let Some(period) = self.rig.mains_period() else { return Ok(()) };
