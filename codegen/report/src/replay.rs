@@ -230,7 +230,7 @@ impl Report {
 impl Outcome for Report {
     fn text(&self) -> String {
         let mut out = format!(
-            "{}\n  {} ticks, {:.4} s, in {} blocks; codes, status, supervisor and {} digests of the machine compared\n",
+            "{}\n  {} ticks, {:.4} s, in {} blocks; codes, status, supervisor and {} digests of the state compared\n",
             self.title, self.ticks, self.seconds, self.blocks, self.digests
         );
         let columns = [right(9).behind("  tick "), right(10).behind(" "), left(0).behind(" s  ")];
