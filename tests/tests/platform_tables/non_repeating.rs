@@ -142,12 +142,13 @@ enum Records {
     ThreeFiles,
 }
 
-/// The chosen model of a leg, as `identify --model auto --validate` writes it.
-fn identified(leg: &LegParameters, number: u64) -> String {
+/// The grid and the file of the chosen model of a leg, as `identify --model auto --validate` writes it.
+fn identified(leg: &LegParameters, number: u64) -> (usize, String) {
     let [slow, fast, random] = three_records(leg, number);
     let options = Options { finest: MAX_GRID, ..Options::new(32, VOLTAGE) };
     let both = join(&[slow, fast], VOLTAGE).unwrap();
-    write_leg_csv(&choose(&both, Some(&random), &options, LegModelKind::Auto).unwrap().model)
+    let model = choose(&both, Some(&random), &options, LegModelKind::Auto).unwrap().model;
+    (model.table.grid, write_leg_csv(&model))
 }
 
 /// A controller with the leg models that are chosen from `records`.
@@ -156,7 +157,8 @@ fn chosen(class: u32, records: Records) -> Bench {
     let (name, records, grid) = match records {
         Records::OneFile(grid) => ("one", two_rates(&legs.legs), grid),
         Records::ThreeFiles => {
-            ("three", std::array::from_fn(|leg| identified(&legs.legs[leg], leg as u64)), Some(MAX_GRID))
+            let found: [_; 6] = std::array::from_fn(|leg| identified(&legs.legs[leg], leg as u64));
+            ("three", found.each_ref().map(|(_, text)| text.clone()), Some(found[0].0))
         }
     };
     let grid = grid.map_or(String::new(), |grid| format!("grid = {grid}\n"));
