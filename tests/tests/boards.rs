@@ -214,6 +214,7 @@ fn every_board_is_tested() {
 
 /// `specgen build` runs it on the emulated core, to estimate the longest tick; the full run does so.
 #[test]
+#[ignore = "long: a program of a real board"]
 fn the_program_that_times_a_tick_is_built() {
     program_of(&H743, "tick");
 }

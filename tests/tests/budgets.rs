@@ -159,6 +159,13 @@ pub fn measured(spec: &str, name: &str, edits: &[(&str, &str)], mcu: Mcu) -> Opt
     let m = verify::measure(&image, &controller.default_config(), &host).unwrap();
     assert_eq!(m.first_difference, None, "{name}");
     print(name, &m);
+    // The gate names who takes most.
+    let mut tight = emitted.compiled.model.target.clone();
+    tight.budget.instructions = m.used.instructions.map(|count| count - 1);
+    tight.budget.flash = Some(m.used.flash - 1);
+    let over = specgen::budget::over(&tight, &m.used);
+    let named = |what: &str| over.iter().any(|one| one.contains(what) && one.contains(": reduce it by 1; largest: "));
+    assert!(named("target.budget.instructions allows") && named("target.budget.flash allows"), "{name}: {over:?}");
     Some((emitted, image, m))
 }
 

@@ -190,7 +190,7 @@ fn spikes_hum_and_steps_are_named_and_spoil_neither_dead_time_nor_table() {
         let later = (found.report.dead_time / clean.report.dead_time - 1.0).abs();
         assert!(later < 0.1 && apart < 40e-9, "{code}: {later} {apart:e} {:#?}", found.warnings);
     };
-    for seed in 0..length(3, 30) {
+    for seed in 0..length(1, 30) {
         let mut random = generator(seed);
         let mut place = |from: f64, to: f64| from + (to - from) * uniform(&mut random);
         let spikes = |count: usize, samples: usize, height: f64, place: &mut dyn FnMut(f64, f64) -> f64| {

@@ -118,7 +118,7 @@ fn spikes_hum_and_a_step_do_not_spoil_a_measured_record() {
     spoil("W0521", &|k| 50e-9 * (std::f64::consts::TAU * 50.0 * forc.time[k]).sin());
     spoil("W0520", &|k| if k > 25_400 { 0.4e-6 } else { 0.0 });
     // The drive has these frequencies: hum there stays in the fit, and is named.
-    for frequency in [20.0, 40.0, 60.0] {
+    for frequency in [20.0, 40.0, 60.0].into_iter().take(length(1, 3)) {
         let hum = |time: &f64| 50e-9 * (std::f64::consts::TAU * frequency * time).sin();
         let y = forc.displacement.iter().zip(&forc.time).map(|(y, time)| y + hum(time)).collect();
         let record = Record::from_columns("hum.csv", forc.time.clone(), forc.drive.clone(), y).unwrap();

@@ -116,7 +116,7 @@ fn the_worst_tick_of_the_hostile_record_is_bounded() {
     let emitted = Emitted::new("platform-budget-hostile", "reference.toml", &[]);
     let Some(image) = emitted.image(Mcu::Mps2An500) else { return };
     let mut controller = emitted.at_run_time();
-    let ticks = specgen_tests::length(8_000, 20_000);
+    let ticks = specgen_tests::length(4_000, 20_000);
     let inputs = emitted.platform_stimulus(&controller.description().clone(), ticks, 3);
     let modes = [("P/F pcc", 6.0), ("P", 0.0), ("F invhys", 1.0)];
     for &(what, mode) in &modes[..specgen_tests::length(1, modes.len())] {

@@ -14,7 +14,7 @@ use specgen::identify::{Options, Record, identify, parse_record, write_table_csv
 use specgen::model::Mcu;
 use specgen::target::Image;
 use specgen::verify;
-use specgen_tests::{Emitted, assert_same_bits, column, host_trace, integers, length, skipped};
+use specgen_tests::{Emitted, assert_same_bits, column, host_trace, integers, length};
 
 /// Ticks of each comparison.
 fn ticks() -> usize {
@@ -25,7 +25,7 @@ const EXERCISE: u32 = 5000;
 pub const CREEP: &str = "memory  = 64\nrate = \"creep\"\ncreep_times = [\"2 s\", \"50 ms\", \"4 ms\"]\ncreep_weights = [0.03, 0.05, 0.08]\ndead_time = \"0.35 ms\"";
 pub const DYNAMIC: &str = "memory  = 8\nrate = \"dynamic-preisach\"\nrate_tables = [\"records/mu1.csv\"]";
 /// STATIC_INVERSE.
-const FELL_BACK: u64 = 0x3f00_0000;
+pub const FELL_BACK: u64 = 0x3f00_0000;
 
 /// A second table of either sign: a lag in the lower half of the range, a lead above.
 pub fn rate_table() -> String {
@@ -87,11 +87,6 @@ fn cost(name: &str, emitted: &Emitted, image: &Image) {
     // Bounded, whatever the data: the inverse of (6) ends after a fixed number of steps.
     assert!(step.max <= 6 * leg.max + 4500, "{name}: {} instructions at most", step.max);
     assert_eq!(figures::held("rate.json", &name, &m.compiler, figures::cost(&m)), Vec::<String>::new());
-    // The gate names who costs most.
-    let mut tight = model.target.clone();
-    tight.budget.instructions = Some(m.used.instructions.unwrap() - 1);
-    let words = specgen::budget::over(&tight, &m.used).join("; ");
-    assert!(words.contains("reduce it by 1; largest: "), "{words}");
 }
 
 /// The table of costs in docs/hysteresis.md has the committed figures.
@@ -132,13 +127,10 @@ fn dynamic_preisach_in_f32_is_equal_in_every_bit() {
 }
 
 #[test]
+#[ignore = "long: images of their own; the short run has the dynamic model in `platform_bits`"]
 fn both_options_of_a_platform_are_equal_in_every_bit() {
     let creep = CREEP.replace("\ndead_time = \"0.35 ms\"", "");
-    if length(true, false) {
-        skipped("only in the full run: creep of a platform, which is that of six legs");
-    } else {
-        equal_bits("rate-creep-platform", "reference.toml", &[("memory  = 64", &creep)], &[Mcu::Mps2An500], false);
-    }
+    equal_bits("rate-creep-platform", "reference.toml", &[("memory  = 64", &creep)], &[Mcu::Mps2An500], false);
     equal_bits("rate-dynamic-platform", "reference.toml", &[("memory  = 64", DYNAMIC)], &[Mcu::Mps2An500], true);
 }
 

@@ -23,7 +23,7 @@ fn quoted<'a>(help: &'a str, marker: &str) -> &'a str {
 
 #[test]
 fn a_converter_too_coarse_is_refused_with_the_bits_that_would_do() {
-    for spec in ["reference.toml", "legs.toml"] {
+    for spec in ["reference.toml", "legs.toml"].into_iter().take(length(1, 2)) {
         let (_, good) = verdict(spec, &[]);
         let found = good.unwrap();
         // 150 V in 65,535 codes through 5 × 0.1262 µm/V.

@@ -14,7 +14,7 @@ use specgen_runtime::{Calibration, GaugeCalibration as _, Gauges, Real};
 use specgen_tests::worse;
 
 fn poses() -> usize {
-    specgen_tests::length(400, 2000)
+    specgen_tests::length(150, 2000)
 }
 
 /// Where the line of a gauge meets its plane, from its point, along its direction, less the same at rest: by the rotated plane
@@ -118,7 +118,7 @@ fn a_workspace_of_millimetres_and_a_degree_is_as_exact() {
         model.workspace.rotation = [0.02; 3];
         model.sensor.range = [-4e-3, 4e-3];
         let ir = lowered(&model).unwrap();
-        let [shift, turn] = pose_error::<f64>(&model, &ir, 3, 500);
+        let [shift, turn] = pose_error::<f64>(&model, &ir, 3, specgen_tests::length(100, 500));
         println!("{} passes: {shift:.1e} m, {turn:.1e} rad", sensing(&ir).passes);
         assert!(sensing(&ir).passes > 3 && shift <= 1e-12 && turn <= 1e-12, "{shift:e} m, {turn:e} rad");
     }
@@ -214,7 +214,8 @@ fn forward_kinematics_undoes_the_inverse_over_the_workspace() {
 /// Independent gauges of the declared noise behind a converter of the declared step, through the whole solution.
 #[test]
 fn predicted_pose_noise_is_what_noisy_gauges_give() {
-    let draws = specgen_tests::length(8_000, 40_000);
+    // Of as many draws, the spread of an rms: 1.3 % and 0.35 %.
+    let (draws, near) = specgen_tests::length((3_000, 0.95..=1.05), (40_000, 0.97..=1.03));
     for layout in [tilted(), three_two_one()].into_iter().take(specgen_tests::length(1, 2)) {
         let mut model = model(layout);
         // A coarse converter, so that its part counts.
@@ -242,7 +243,7 @@ fn predicted_pose_noise_is_what_noisy_gauges_give() {
         }
         for (seen, predicted) in of_pose.iter().chain(&of_leg).zip(predicted.pose.iter().chain(&predicted.leg)) {
             let ratio = (seen / f64::from(draws)).sqrt() / predicted;
-            assert!((0.97..=1.03).contains(&ratio), "{ratio}");
+            assert!(near.contains(&ratio), "{ratio}");
         }
     }
 }

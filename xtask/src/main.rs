@@ -21,11 +21,10 @@ use xtask::{root, run, setup};
 const USAGE: &str = "usage: cargo xtask COMMAND
 
   setup   installs the tools that the tests need: a cross compiler for Cortex-M, and QEMU
-  test    runs setup, then checks formatting, all tests in short form, generated files, lock files and licences; with CI set, also
-          lints
+  test    runs setup, then checks formatting, all tests in short form, generated files, lock files and licences
   test --full
-          runs all tests at full length, board images, faults and documentation, and checks packages for known defects; writes
-          tests/results.txt
+          runs all tests at full length, board images, faults, lints and documentation, and checks packages for known defects;
+          writes tests/results.txt
   test --checks
           runs only the part of the full run that is neither its tests nor its board images
   mutants [MINUTES | K/N | all]: mutation tests, as samples for a given time, one sample, or all; writes tests/results.txt

@@ -114,18 +114,15 @@ fn with_boards(root: &Path, manifests: &[&str]) -> Vec<String> {
 /// `cargo xtask test`
 pub fn test(root: &Path) -> ExitCode {
     let before = results::changes(root);
-    // Lints need a second pass of the compiler, so they run only under CI and in the full run.
-    let lints_too = std::env::var_os("CI").is_some();
     let locked = with_boards(root, &LOCKED);
-    let mut report = Report::new(7 + usize::from(lints_too) + locked.len());
+    let mut report = Report::new(8 + locked.len());
     report.step("the last full run", || results::judge(root));
     report.step("formatting", || formatting(root));
     let binaries = compiled(root, false, &mut report);
     let mode = Mode { tools_missing: !set_up(root, &mut report), ..Mode::default() };
     report.step("tests", || binaries::test(root, &binaries, mode, &mut TestResults::default()));
-    if lints_too {
-        report.step("lints", || lints(root, false));
-    }
+    // They need a second pass of the compiler.
+    report.step("lints", || Outcome::Skipped("only in the full run: cargo xtask test --full".to_owned()));
     report.step("generated files are fresh", || maintained(root, &["check"]));
     for manifest in &locked {
         report.step(&format!("lock file and licences of {manifest}"), || packages::check(root, manifest));
@@ -180,7 +177,7 @@ pub fn full(root: &Path) -> ExitCode {
 pub fn checks(root: &Path) -> ExitCode {
     let mut report = Report::new(6);
     report.step("tests with all checks", || checked(root));
-    report.step("lints of all packages", || lints(root, true));
+    report.step("lints", || lints(root));
     report.step("examples in the documentation", || binaries::examples(root));
     report.step("documentation", || {
         let mut doc = cargo(root, &["doc", "--release", "--workspace", "--no-deps", "--quiet"]);
@@ -306,22 +303,18 @@ fn rust_files(folder: &Path, files: &mut Vec<String>) -> std::io::Result<()> {
     Ok(())
 }
 
-/// Lints libraries, programs and tests of the workspace; with `all`, also its benchmarks and packages outside of it.
-fn lints(root: &Path, all: bool) -> Outcome {
+/// Lints all targets of the workspace and of the packages outside of it.
+fn lints(root: &Path) -> Outcome {
     if let Err(outcome) = setup::component("clippy", "clippy") {
         return outcome;
     }
     // In release, to share build scripts and macros with the tests. Boards are linted by their own tests, in an emitted workspace.
-    let targets: &[&str] = if all { &["--all-targets"] } else { &["--bins", "--tests", "--exclude=specgen-benches"] };
-    let own = [&["--workspace"], targets].concat();
     // In the same target folder, because most dependencies are shared.
     let alone = |manifest| ["--manifest-path", manifest, "--all-targets", "--locked", "--target-dir", "target"];
-    let mut scopes = vec![own];
-    scopes.extend([REAL_TIME, EMULATED].map(alone).iter().filter(|_| all).map(|scope| scope.to_vec()));
+    let mut scopes = vec![vec!["--workspace", "--all-targets"]];
+    scopes.extend([REAL_TIME, EMULATED].map(|manifest| alone(manifest).to_vec()));
     // These lints forbid panics that the optimiser cannot remove.
-    if !all {
-        println!("only members of the workspace; the full run checks the others");
-    } else if setup::has_target() {
+    if setup::has_target() {
         scopes.extend([FIRMWARE, TICK].map(|manifest| [&alone(manifest)[..], &["--target", TRIPLE]].concat()));
     } else {
         println!("not checked: {FIRMWARE} and {TICK}, because rustc has no target {TRIPLE}");

@@ -4,7 +4,7 @@ use std::fs;
 
 use serde_json::{Value, json};
 
-use crate::support::{Folder, Run, repository};
+use crate::support::{Folder, Run, length, repository};
 use specgen::diagnostic::{Diagnostic, Severity};
 use specgen::spec::{self, SpecSource};
 use specgen::target;
@@ -121,7 +121,8 @@ fn the_verdict_counts_them() {
     let folder = Folder::new();
     let summary = format!("  assumed  {OF_REFERENCE} values, simulated leg record\n");
     let headline = format!("reference is good so far on {OF_REFERENCE} assumed values: 8 limits kept, 3 warnings\n");
-    for arguments in [&["check", "reference.toml"][..], &["reference.toml", "-o", "out", "--no-build"]] {
+    let ways = [&["reference.toml", "-o", "out", "--no-build"][..], &["check", "reference.toml"]];
+    for arguments in ways.into_iter().take(length(1, 2)) {
         let run = folder.run(arguments);
         assert!(run.code == 0 && run.stdout.starts_with(&headline) && run.stdout.contains(&summary), "{run:#?}");
         let details = folder.run(&[arguments, &["--details"]].concat()).stdout;
@@ -234,7 +235,8 @@ fn a_real_board_takes_assumptions_only_if_they_are_accepted() {
     let accepted_size = [&size[..], &["--assumed-ok"]].concat();
     let qemu = ["build", "reference.toml", "--target", "qemu", "--no-measure", "-o", "out"];
     folder.write("own.toml", measured(""));
-    for arguments in [&accepted[..], &accepted_size, &qemu, &["build", "own.toml", "--no-measure", "-o", "out"]] {
+    let all = [&accepted[..], &["build", "own.toml", "--no-measure", "-o", "out"], &accepted_size, &qemu];
+    for arguments in all.into_iter().take(length(2, 4)) {
         let run = folder.run(arguments);
         assert!(
             run.code == 1
@@ -253,7 +255,7 @@ fn a_new_spec_names_what_nobody_gave() {
         ("--gauge-noise", "1 nm", "sensor.noise"),
         ("--lag", "0.2 ms", "amplifier.lag"),
     ];
-    for like in ["reference", "legs"] {
+    for like in ["reference", "legs"].into_iter().take(length(1, 2)) {
         let mut arguments = vec!["new", like, "--like", like];
         given.iter().for_each(|(option, value, _)| arguments.extend([*option, *value]));
         let (code, document) = json_of(&folder, &arguments);

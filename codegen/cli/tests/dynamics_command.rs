@@ -1,5 +1,5 @@
 //! `specgen dynamics` as a user runs it.
-use crate::support::{Folder, repository};
+use crate::support::{Folder, length, repository};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use serde_json::Value;
@@ -141,7 +141,7 @@ fn no_double_is_misread_however_it_is_written() {
     ]
     .map(str::to_owned)
     .to_vec();
-    for k in 0..30_000 {
+    for k in 0..length(6_000, 30_000) {
         // Every tenth is a subnormal, because of the shift.
         let bits = random.next_u64();
         let value = f64::from_bits(if k % 10 == 0 { bits >> 12 } else { bits });

@@ -8,6 +8,7 @@ use std::io::Read;
 use std::os::unix::fs::{PermissionsExt, symlink};
 use std::os::unix::process::ExitStatusExt;
 use std::process::{Command, Stdio};
+use std::sync::OnceLock;
 use std::time::{Duration, Instant};
 
 use rustix::fs::{CWD, Mode, mkfifoat};
@@ -139,13 +140,21 @@ fn prepared() -> Folder {
     let sine = |k: i32| (f64::from(k) * 0.1).sin();
     let rows = (0..400).map(|k| format!("{},{},{}\n", f64::from(k) * 1e-3, 50.0 + 40.0 * sine(k), 6.0 + 5.0 * sine(k)));
     folder.write("sine.csv", format!("time_s,drive_V,displacement_um\n{}", rows.collect::<String>()));
-    for line in [
-        &["forc", "--grid", "4", "-o", "r.csv"][..],
-        &["identify", "r.csv", "--drive", "0:100", "--grid", "4", "-o", "table.csv"],
-        &["sim", "legs.toml", "--seconds", "0.1", "--record", "run.rec"],
-    ] {
-        assert_eq!(folder.run(line).code, 0, "{line:?}");
-    }
+    // Made once for all tests.
+    static MADE: OnceLock<[(&str, Vec<u8>); 3]> = OnceLock::new();
+    let made = MADE.get_or_init(|| {
+        let folder = Folder::new();
+        [
+            ("r.csv", &["forc", "--grid", "4", "-o", "r.csv"][..]),
+            ("table.csv", &["identify", "r.csv", "--drive", "0:100", "--grid", "4", "-o", "table.csv"]),
+            ("run.rec", &["sim", "legs.toml", "--seconds", "0.1", "--record", "run.rec"]),
+        ]
+        .map(|(name, line)| {
+            assert_eq!(folder.run(line).code, 0, "{line:?}");
+            (name, fs::read(folder.path(name)).unwrap())
+        })
+    });
+    made.iter().for_each(|(name, bytes)| folder.write(name, bytes));
     folder
 }
 

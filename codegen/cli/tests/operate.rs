@@ -12,7 +12,7 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use crate::board_support::Line;
-use crate::support::{Folder, Run};
+use crate::support::{Folder, Run, length};
 use controller::supervised::Phase;
 use specgen_link::client::Port;
 
@@ -138,7 +138,7 @@ fn a_script_runs_a_wave_and_fetches_its_record() {
     let run = Run::of(&mut board.operate(&folder, &["set gauge[0]=1"]));
     run.says(2, &["`gauge[0]` cannot be set; these can: command, selector"]);
     // An error in the last line is found before the first is executed.
-    for (last, code, text) in [
+    let cases = [
         (
             "set command=x",
             2,
@@ -152,7 +152,8 @@ fn a_script_runs_a_wave_and_fetches_its_record() {
         ("record download wave.toml; on-edge wave wave.toml", 2, "it is an input of this command, `wave.toml`"),
         ("record download reference.toml", 2, "it is an input of this command, `reference.toml`"),
         ("record download legs.toml/x.rec", 3, "could not create the folder `legs.toml`"),
-    ] {
+    ];
+    for (last, code, text) in cases.into_iter().step_by(length(2, 1)) {
         let lines = ["reference.toml", "arm", "wait arming 20"].into_iter().chain(last.split("; "));
         let run = Run::of(&mut board.operate(&folder, &lines.collect::<Vec<_>>()));
         run.says(code, &[text]);

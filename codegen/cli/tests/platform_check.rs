@@ -2,7 +2,7 @@
 
 use std::fs;
 
-use crate::support::{Folder, repository};
+use crate::support::{Folder, length, repository};
 
 /// A folder with the spec `name`, with adjusted paths of records.
 fn folder(name: &str) -> (Folder, String) {
@@ -56,7 +56,7 @@ fn gains_that_are_too_high_are_refused_in_their_line_and_the_offer_is_accepted()
     let (folder, text) = folder("features/platform-gains.toml");
     folder.write("good.toml", &text);
     assert_eq!(folder.run(&["check", "good.toml"]).code, 0);
-    for section in ["gains", "position_gains"] {
+    for section in ["gains", "position_gains"].into_iter().take(length(1, 2)) {
         let strong = ["1e13", "1e13", "1e13", "1e11", "1e11", "1e11"].map(str::to_owned);
         let bad = with_numbers(&text, section, "integral", &strong);
         folder.write("bad.toml", &bad);

@@ -3,8 +3,9 @@
 
 use std::fmt::Write as _;
 use std::fs;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
-use crate::support::{Document, Folder};
+use crate::support::{Document, Folder, length};
 use serde_json::Value;
 
 const HEADER: &str = "time_s,drive_V,displacement_um";
@@ -83,8 +84,14 @@ fn refused(content: impl AsRef<[u8]>, expected: &Expected) {
         assert_eq!(finding["line"].as_u64().map(|line| line as usize), expected.line, "{finding:#}");
         assert!(finding["help"].as_str().unwrap().contains(expected.help), "{finding:#}");
     }
-    let place = expected.line.map_or(format!("--> {BAD}"), |line| format!("--> {BAD}:{line}"));
-    folder.run(&["check", "platform.toml"]).says(1, &[&format!("error[{}]: ", expected.code), &place, expected.help]);
+    // As text, one of four in the short run.
+    static NUMBER: AtomicUsize = AtomicUsize::new(0);
+    if NUMBER.fetch_add(1, Ordering::Relaxed).is_multiple_of(length(4, 1)) {
+        let place = expected.line.map_or(format!("--> {BAD}"), |line| format!("--> {BAD}:{line}"));
+        folder
+            .run(&["check", "platform.toml"])
+            .says(1, &[&format!("error[{}]: ", expected.code), &place, expected.help]);
+    }
     assert_eq!(folder.listing(), before);
 }
 

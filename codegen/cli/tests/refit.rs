@@ -73,18 +73,24 @@ fn a_leg_that_lost_gain_is_named_and_no_other() {
             assert!(first.stdout.contains(part), "{}", first.stdout);
         }
 
-        spec(&folder, "own.toml", &records("own/leg3.csv"));
-        let (legs, named) = refit(&folder, "own.toml", &plant);
-        println!("{plant:?}: unchanged {:+.4?}", numbers(&legs, "gain"));
-        assert!(named.is_empty(), "{named:?}");
-        assert!(numbers(&legs, "gain").iter().all(|[change, error]| change.abs() < 0.01 && *error < 0.01));
+        // In the short run, the five other legs are the unchanged ones.
+        if length(false, true) {
+            spec(&folder, "own.toml", &records("own/leg3.csv"));
+            let (legs, named) = refit(&folder, "own.toml", &plant);
+            println!("{plant:?}: unchanged {:+.4?}", numbers(&legs, "gain"));
+            assert!(named.is_empty(), "{named:?}");
+            assert!(numbers(&legs, "gain").iter().all(|[change, error]| change.abs() < 0.01 && *error < 0.01));
+        }
 
         folder.write("leg3.csv", scaled(&folder.read("own/leg3.csv"), 1.0 / 0.979));
         spec(&folder, "lost.toml", &records("leg3.csv"));
         let (legs, named) = refit(&folder, "lost.toml", &plant);
         println!("  leg 3 with -2.1 % {:+.4?}", numbers(&legs, "gain"));
-        let [change, error] = numbers(&legs, "gain")[2];
-        assert!((change + 0.021).abs() < 3.0 * error, "{change} ± {error}");
+        for (leg, [change, error]) in (1..).zip(numbers(&legs, "gain")) {
+            let is_good =
+                if leg == 3 { (change + 0.021).abs() < 3.0 * error } else { change.abs() < 0.01 && error < 0.01 };
+            assert!(is_good, "leg {leg}: {change} ± {error}");
+        }
         assert!(named.len() == 1 && named[0].starts_with("leg 3: gain -2."), "{named:?}");
         assert!(named[0].ends_with("% since identification, cubic term assumed unchanged; refit"), "{named:?}");
     }
@@ -120,8 +126,7 @@ fn a_run_that_does_not_show_the_legs_is_refused_with_one_that_does() {
     let line = refused.stderr.split('`').find(|part| part.starts_with("specgen sim ")).unwrap();
     let better: Vec<&str> = line.split(' ').skip(1).collect();
     folder.run(&better).says(0, &[]);
-    folder.run(&["identify", "run.rec", "--spec", "reference.toml"]).says(0, &[]);
-    // Tables go to the folder of the spec, wherever the command runs.
+    // It is accepted. Tables go to the folder of the spec, wherever the command runs.
     std::fs::create_dir(folder.path("lab")).unwrap();
     let mut beside = folder.command();
     beside.current_dir(folder.path("lab"));

@@ -25,8 +25,8 @@ fn a_machine_run_alone_gives_the_same_bits() {
         let report = &whole["result"];
         let drawn: Vec<&Value> = report["runs"].as_array().unwrap().iter().filter(|run| run["drawn"] == true).collect();
         assert_eq!(drawn.len(), 4);
-        let names = [drawn[0]["name"].as_str().unwrap(), drawn[3]["name"].as_str().unwrap(), "all-stiff"];
-        for name in names {
+        let names = ["all-stiff", drawn[3]["name"].as_str().unwrap(), drawn[0]["name"].as_str().unwrap()];
+        for name in names.into_iter().take(length(2, 3)) {
             let mut arguments = some.to_vec();
             arguments.extend(["--replay", name]);
             let alone = folder.json(&arguments).value;
@@ -39,7 +39,7 @@ fn a_machine_run_alone_gives_the_same_bits() {
         let rows = report["table"].as_array().unwrap().iter();
         let worst: BTreeSet<[&str; 2]> =
             rows.map(|row| ["replay", "name"].map(|key| row["worst"][key].as_str().unwrap())).collect();
-        for [command, name] in worst {
+        for [command, name] in worst.into_iter().take(length(1, usize::MAX)) {
             let words: Vec<&str> = command.split(' ').skip(1).collect();
             let alone = folder.json(&words).value;
             assert_eq!(machine(&alone["result"], name), machine(report, name), "{command}");
@@ -97,7 +97,7 @@ fn a_leg_that_is_short_of_voltage_is_said_to_be_at_its_limit() {
     assert!(run.stdout.contains(", a leg at its limit in "), "{}", run.stdout);
 }
 
-/// Ten in the short run; 100 on legs of each class in the full one.
+/// Four in the short run; 100 on legs of each class in the full one.
 #[test]
 fn random_machines_with_a_mode_soft_joints_a_cable_mains_drift_and_jitter_are_stable() {
     let folder = Folder::new();
@@ -111,14 +111,14 @@ fn random_machines_with_a_mode_soft_joints_a_cable_mains_drift_and_jitter_are_st
     for plant in length(&["plays"][..], &["plays", "bouc-wen", "widening.json"]) {
         let study = |structure: &str| {
             let vary = format!("structure={structure}");
-            let draws = length("10", "100");
+            let draws = length("4", "100");
             let arguments = ["robust", spec, "--draws", draws, "--vary", &vary, "--seed", "3", "--plant", plant];
             let report = folder.json(&arguments).value["result"].clone();
             let runs = report["runs"].as_array().unwrap().clone();
             runs.iter().filter(|run| run["drawn"] == true).map(|run| run["outcome"]["ran"].clone()).collect::<Vec<_>>()
         };
         let (with, without) = (study("1"), study("0"));
-        assert_eq!(with.len(), length(10, 100));
+        assert_eq!(with.len(), length(4, 100));
         let mut ratios: Vec<f64> = with
             .iter()
             .zip(&without)
@@ -155,7 +155,10 @@ fn the_gate_of_options_or_spec_fails_a_build_with_the_reason_and_the_figures() {
     let folder = Folder::new();
     let few = ["robust", "legs.toml", "--draws", "3", "--frequency", "10", "--vary", "gain=1%"];
     let with = |more: &[&str]| folder.run(&[&few, more].concat());
-    with(&["--max-error", "1 nm"]).says(1, &["not robust: largest rms error is", "above 1.00 nm"]);
+    // The short run has this message from the spec's own gate, and as JSON.
+    if length(false, true) {
+        with(&["--max-error", "1 nm"]).says(1, &["not robust: largest rms error is", "above 1.00 nm"]);
+    }
     with(&["--max-error", "1 nm", "--quantile", "95"]).says(1, &["95 % quantile of the rms error is"]);
     let passed = with(&["--max-error", "1 um", "--plot", "robust.svg"]);
     assert!(folder.read("robust.svg").contains(">corners<"));

@@ -18,6 +18,7 @@ use crate::support::{length, skipped};
 use host_sim::controller::{Controller, Supervised, TickController};
 use rustix::process::Signal;
 use serde_json::Value;
+use specgen::compile::Compilation;
 use specgen::{compile, emit, target, workspace};
 use specgen_link::{Bytes, RecorderAction, Refusal, Request, WaveAction};
 use specgen_runtime::wave::{AxisWave, Settings, Shape, Tone, step_of};
@@ -76,10 +77,13 @@ impl Programs {
         let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("rt-pc-of").join(name);
         let _ = fs::remove_dir_all(&folder);
         fs::create_dir_all(&folder).unwrap();
-        let (root, _one) = staged(spec);
+        let (root, compiled, _one) = staged(spec);
         let binary = folder.join("rt-pc");
         fs::copy(cargo(&root, "build").join("release/rt-pc"), &binary).unwrap();
-        let library = target::host::build_library(&root, &root.join("target")).unwrap();
+        // From the workspace of the main job, whose library is taken from the build cache.
+        let plain = folder.join("workspace");
+        workspace::write_scratch(&plain, &compiled.files()).unwrap();
+        let library = target::host::build_library(&plain, &plain.join("target")).unwrap();
         Self { binary, library }
     }
 }
@@ -104,7 +108,7 @@ fn cargo(workspace: &Path, verb: &str) -> PathBuf {
 
 /// The workspace of a spec, at the same path for all specs, so that cargo recompiles only crates with changed files. While the guard
 /// lives, no other spec is written there.
-fn staged(spec: &Path) -> (PathBuf, MutexGuard<'static, ()>) {
+fn staged(spec: &Path) -> (PathBuf, Compilation, MutexGuard<'static, ()>) {
     static ONE: Mutex<()> = Mutex::new(());
     let one = ONE.lock().unwrap_or_else(PoisonError::into_inner);
     let compiled = compile::compile(spec).unwrap_or_else(|_| panic!("{} compiles", spec.display()));
@@ -130,14 +134,14 @@ fn staged(spec: &Path) -> (PathBuf, MutexGuard<'static, ()>) {
         fs::create_dir_all(path.parent().unwrap()).unwrap();
         fs::write(path, text).unwrap();
     }
-    (root, one)
+    (root, compiled, one)
 }
 
 /// Only for the reference: some of these tests need features that other specs lack.
 #[test]
 #[ignore = "long: the program compiled once more"]
 fn the_tests_of_the_program_itself_pass() {
-    let (root, _one) = staged(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../../specs/reference.toml"));
+    let (root, _, _one) = staged(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../../specs/reference.toml"));
     cargo(&root, "test");
 }
 

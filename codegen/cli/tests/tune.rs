@@ -95,7 +95,9 @@ fn ultimate_gain(compiled: &Compilation, axis: usize) -> f64 {
 fn tuned_gains_of_a_platform_hold_their_margins_and_are_those_that_the_spec_then_gives() {
     let folder = Folder::new();
     let spec = folder.read("reference.toml");
-    let document = folder.json(&["tune", "reference.toml", "--evaluations", "150", "--seconds", "0.5", "--write"]);
+    let evaluations = support::length("60", "150");
+    let search = ["tune", "reference.toml", "--evaluations", evaluations, "--seconds", "0.5", "--write"];
+    let document = folder.json(&search);
     assert_eq!(document.code, 0, "{:#}", document.value);
     let report = &document.value["result"];
     let tuned = row(report, "tuned");

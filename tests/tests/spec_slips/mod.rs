@@ -102,14 +102,14 @@ fn bases() -> BTreeMap<Of, Base> {
     which.into_iter().map(|of| (of, Base::of(of))).collect()
 }
 
-/// Slips, each with its text and what is found; every tenth of them in the short run. Two tests look at them.
+/// Slips, each with its text and what is found; every fifteenth of them in the short run. Two tests look at them.
 type SlipResults = Vec<(&'static Slip, (String, Vec<Diagnostic>))>;
 
 fn caught() -> &'static SlipResults {
     static TRIED: OnceLock<SlipResults> = OnceLock::new();
     TRIED.get_or_init(|| {
         let bases = bases();
-        let some = slips().iter().step_by(specgen_tests::length(10, 1));
+        let some = slips().iter().step_by(specgen_tests::length(15, 1));
         some.map(|slip| (slip, bases[&slip.of].with(slip))).collect()
     })
 }
@@ -245,7 +245,7 @@ fn every_fix_that_is_offered_is_accepted_by_the_next_check() {
                 }
             }
         };
-    for (slip, (text, found)) in caught().iter().step_by(specgen_tests::length(8, 1)) {
+    for (slip, (text, found)) in caught().iter().step_by(specgen_tests::length(5, 1)) {
         let base = &bases[&slip.of];
         let next = |text: &str| verdict(text, base.folder.path()).1;
         (0..found.len()).for_each(|at| try_fix(&format!("{:?}", slip.edits), found, at, text, &next));
@@ -288,7 +288,7 @@ fn a_hundred_plausible_platforms_are_not_refused() {
     let mut refused = String::new();
     let folder = tempfile::tempdir().unwrap();
     let mut random = ChaCha8Rng::seed_from_u64(20_261_123);
-    for index in 0..specgen_tests::length(6, 100) {
+    for index in 0..specgen_tests::length(3, 100) {
         let text = plausible::platform(&mut random, folder.path(), index);
         let (accepted, found) = verdict(&text, folder.path());
         if !accepted {

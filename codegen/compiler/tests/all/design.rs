@@ -4,6 +4,7 @@ use specgen_compiler::stability::platform::{Design, Tuning, describe, design};
 use specgen_language::model::{Gains, Interaction, Model, TaskSpace};
 use specgen_runtime::ControlMode;
 
+use super::length;
 use super::study::{model, rest};
 
 fn designed(
@@ -76,8 +77,7 @@ fn offered(help: &str) -> f64 {
 #[test]
 fn unstable_numbers_are_refused_at_their_key_and_what_is_offered_is_accepted() {
     let rule = designed(|_, _| ()).unwrap();
-    let strong = [8.0, 30.0, 300.0];
-    for factor in strong {
+    for &factor in length(&[30.0][..], &[8.0, 30.0, 300.0]) {
         // Bandwidths.
         let with = |scale: f64| {
             designed(|_, task| {

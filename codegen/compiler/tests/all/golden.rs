@@ -425,10 +425,11 @@ fn a_word_that_is_no_number_is_known() {
 #[test]
 fn no_finding_says_a_number_that_is_none() {
     let full = std::env::var_os("SPECGEN_FULL").is_some();
-    let (specs, factors): (&[&str], &[f64]) = if full {
-        (&SPECS, &[0.0, -1.0, 1e-9, 1e-3, 0.3, 10.0, 1e3, 1e9])
+    // In the short run, every third line of one spec.
+    let (specs, factors, step): (&[&str], &[f64], usize) = if full {
+        (&SPECS, &[0.0, -1.0, 1e-9, 1e-3, 0.3, 10.0, 1e3, 1e9], 1)
     } else {
-        (&["features/platform-calibration.toml"], &[0.0])
+        (&["features/platform-calibration.toml"], &[0.0], 3)
     };
     let mut sources: Vec<SpecSource> = specs.iter().map(|name| read(name)).collect();
     // A gauge with far too wide a range and zero noise, of which nothing is a multiple.
@@ -442,7 +443,7 @@ fn no_finding_says_a_number_that_is_none() {
     for source in sources {
         let mut texts = vec![source.text.clone()];
         for (number, factor) in factors.iter().enumerate() {
-            for (at, slip) in slips(&source.text, *factor) {
+            for (at, slip) in slips(&source.text, *factor).into_iter().step_by(step) {
                 let line = source.text.lines().nth(at - 1).unwrap_or_default().to_owned();
                 texts.extend(tried.insert((line, number)).then_some(slip));
             }
@@ -464,7 +465,7 @@ fn no_finding_says_a_number_that_is_none() {
         }
     }
     println!("{count} findings");
-    assert!(count > if full { 1000 } else { 50 }, "{count} findings");
+    assert!(count > if full { 1000 } else { 20 }, "{count} findings");
 }
 
 #[test]

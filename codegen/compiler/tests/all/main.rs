@@ -116,7 +116,8 @@ fn ewma_and_pcc_limits_are_the_linear_columns_of_the_study() {
         (1e4, 0.02, Some(1.0), 0.215, None, 5e-4),
         (2e4, 0.02, Some(1.0), 0.108, None, 5e-4),
     ];
-    for (rate, damping, notch, ewma, pcc, half_digit) in rows {
+    // Every second row in the short run: of each damping and each notch some.
+    for (rate, damping, notch, ewma, pcc, half_digit) in rows.into_iter().step_by(length(2, 1)) {
         let closed_loop = loop_at(rate, damping, notch);
         let what = format!("{rate} Hz, ζ {damping}, notch {notch:?}");
         agrees(&what, bandwidth_limit(&closed_loop) / rate, ewma, 0.02, half_digit);

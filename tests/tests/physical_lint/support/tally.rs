@@ -11,7 +11,7 @@ use super::super::list;
 use super::mutants::Mutant;
 use super::{undetectable, verdict};
 
-/// Slips of a set in the full run; a tenth of them in the short one.
+/// Slips of a set in the full run; a fifteenth of them in the short one.
 const MUTANTS: usize = 300;
 
 /// Whether a finding is about the key: at it, or naming it in full.
@@ -101,7 +101,7 @@ pub fn hit_rate(bases: &[Base], make: fn(&str) -> Vec<Mutant>, seed: u64, share:
             *count <= share(one.kind)
         });
         few.extend(rest);
-        let count = specgen_tests::length(MUTANTS / 10, MUTANTS);
+        let count = specgen_tests::length(MUTANTS / 15, MUTANTS);
         few.truncate(count);
         pool = few;
         assert_eq!(pool.len(), count, "of {whole}");

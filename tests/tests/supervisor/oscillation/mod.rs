@@ -90,8 +90,8 @@ fn an_oscillation_from_outside_leads_through_every_stage_in_time() {
     let mut steps: Vec<f64> = (0..).map(|k| 60.0 * 1.12_f64.powi(k)).take_while(|hertz| *hertz < 2000.0).collect();
     // Where a channel might see it stand still.
     steps.extend([833.33, 909.09, 1000.0, 1250.0, 1428.57, 1666.67, 1818.18, 1944.44, 2000.0, 2400.0]);
-    // Each axis in the short run, too: one of each kind at every twelfth frequency.
-    for (number, hertz) in steps.into_iter().step_by(specgen_tests::length(12, 1)).enumerate() {
+    // Each axis in the short run, too: one of each kind at every eighteenth frequency.
+    for (number, hertz) in steps.into_iter().step_by(specgen_tests::length(18, 1)).enumerate() {
         let mut worst = [Some(0.0_f64); 3];
         for axis in specgen_tests::length(vec![number % 3, 3 + number % 3], (0..6).collect()) {
             let mut machine = started.like(&supervised, &rig, &emitted.compiled);
