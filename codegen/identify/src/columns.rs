@@ -13,6 +13,7 @@ use std::io::Read;
 use super::findings::Findings;
 use head::{decoded, has_fields, is_mark, split};
 use lines::LineReader;
+use names::Conversion;
 use specgen_language::diagnostic::{Code, codes};
 use specgen_language::interrupt;
 
@@ -56,8 +57,8 @@ pub(crate) struct Column<'a> {
     pub(crate) at: usize,
     /// Its name for messages.
     pub(crate) name: &'a str,
-    /// Number of the column's units in one unit of the quantity.
-    pub(crate) per: f64,
+    /// To the unit of the quantity.
+    pub(crate) conversion: Conversion,
 }
 
 /// The lines after the header.
@@ -125,8 +126,9 @@ pub(crate) fn open<'a>(
     if found.is_none() && format.preamble {
         return findings.refuse(format.header, None, "is empty".to_owned(), EMPTY);
     }
-    let head = found.unwrap_or(Head { names: Vec::new(), line: 1, interval: None, next: ahead.len(), separator: b',' });
+    let mut head = found.unwrap_or_else(|| Head { next: ahead.len(), ..Head::without_names(1, b',') });
     let simulated = ahead.drain(..head.next).any(|(_, line)| is_mark(&line));
+    head.find_filled(&ahead);
     if let Some((line, message, help)) = head.ambiguous_commas(&ahead).filter(|_| format.preamble) {
         return findings.refuse(format.value, Some(line), message, &help);
     }
@@ -181,7 +183,7 @@ impl Lines<'_> {
             }
             for (column, wanted) in columns.iter_mut().zip(wanted) {
                 let value = self.number(fields.get(wanted.at).copied(), line, wanted.name, findings);
-                column.push(value / wanted.per);
+                column.push(wanted.conversion.apply(value));
             }
             if fields.len() > self.names && !self.format.longer_lines {
                 let message = format!("has {} values, expected {}", fields.len(), self.names);
@@ -242,6 +244,6 @@ impl Format {
 impl<'a> Column<'a> {
     /// A column in the unit of the quantity.
     pub(crate) const fn plain(at: usize, name: &'a str) -> Self {
-        Self { at, name, per: 1.0 }
+        Self { at, name, conversion: Conversion::unit(1.0) }
     }
 }

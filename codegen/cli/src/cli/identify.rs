@@ -211,9 +211,9 @@ struct RateArguments {
 /// Arguments of every kind of record.
 #[derive(Args, Debug)]
 struct BenchArguments {
-    /// Map columns, given by header or number (from 1), to names with units, such as drive_mV=Voltage,time_s=1. If not given,
-    /// columns are found by their headers.
-    #[arg(long, value_name = "NAME=COLUMN,…", value_delimiter = ',')]
+    /// Map columns, given by header or number (from 1), to names with units, such as drive_mV=Voltage,time_s=1, or with a
+    /// scale and an offset, as in 'displacement=CH2*5 um/V+0.3 um'. If not given, columns are found by their headers.
+    #[arg(long, value_name = "NAME=COLUMN,…")]
     columns: Vec<String>,
     /// Sampling rate, Hz: time is computed from sample numbers, or from row numbers.
     #[arg(long, value_name = "HZ", value_parser = number("Hz", "samples per second above zero", 1e-3..=1e9), allow_negative_numbers = true)]
