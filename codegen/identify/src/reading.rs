@@ -11,6 +11,8 @@ pub struct Reading {
     columns: Vec<ColumnChoice>,
     /// Samples per second, Hz; time is computed from it.
     rate: Option<f64>,
+    /// Name or number of the table in a file that has several.
+    series: Option<String>,
 }
 
 /// A column that the user names.
@@ -40,7 +42,18 @@ impl Reading {
     /// The expected form, for the first that does not have it.
     pub fn new(columns: &[String], rate: Option<f64>) -> Result<Self, String> {
         let entries = columns.iter().flat_map(|list| entries(list));
-        Ok(Self { columns: entries.map(column_choice).collect::<Result<_, _>>()?, rate })
+        Ok(Self { columns: entries.map(column_choice).collect::<Result<_, _>>()?, rate, series: None })
+    }
+
+    /// The same, of the table with this name or number (from 1) in a file that has several.
+    #[must_use]
+    pub fn of_series(self, series: Option<String>) -> Self {
+        Self { series, ..self }
+    }
+
+    /// Name or number of the table.
+    pub(crate) fn series(&self) -> Option<&str> {
+        self.series.as_deref()
     }
 
     /// Samples per second, Hz.

@@ -81,7 +81,7 @@ fn at_line(lines: &[Line], at: usize, interval: Option<f64>) -> Head {
 }
 
 /// The separator with which a line is a row of numbers.
-fn separator_of(line: &[u8]) -> Option<u8> {
+pub(super) fn separator_of(line: &[u8]) -> Option<u8> {
     SEPARATORS.into_iter().find(|separator| is_row(line, *separator))
 }
 
@@ -94,7 +94,7 @@ fn of_names(line: &[u8]) -> u8 {
     SEPARATORS.into_iter().rev().max_by_key(|separator| known(*separator)).unwrap_or(b',')
 }
 
-fn names_of(line: &[u8]) -> Vec<String> {
+pub(super) fn names_of(line: &[u8]) -> Vec<String> {
     let line = line.strip_prefix(b"#").or_else(|| line.strip_prefix(b"%")).unwrap_or(line);
     split(line, of_names(line)).into_iter().map(decoded).collect()
 }
@@ -203,7 +203,7 @@ pub(super) fn number(field: &str, separator: u8) -> Option<(f64, Option<char>)> 
 }
 
 /// Whether a line is a row of numbers: at least two fields, some of which may be empty, but not all.
-fn is_row(line: &[u8], separator: u8) -> bool {
+pub(super) fn is_row(line: &[u8], separator: u8) -> bool {
     let fields = split(line, separator);
     let is_number = |field: &&[u8]| std::str::from_utf8(field).is_ok_and(|text| number(text, separator).is_some());
     let filled = fields.iter().filter(|field| !field.is_empty());
