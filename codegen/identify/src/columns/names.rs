@@ -38,6 +38,14 @@ impl Conversion {
 const TIME: &[Unit] = &[("s", 1.0), ("ms", 1e3), ("us", 1e6), ("ns", 1e9)];
 const VOLTAGE: &[Unit] = &[("V", 1.0), ("mV", 1e3), ("uV", 1e6), ("kV", 1e-3)];
 const LENGTH: &[Unit] = &[("um", 1.0), ("nm", 1e3), ("pm", 1e6), ("mm", 1e-3), ("m", 1e-6)];
+const ANGLE: &[Unit] = &[
+    ("urad", 1.0),
+    ("nrad", 1e3),
+    ("mrad", 1e-3),
+    ("rad", 1e-6),
+    ("deg", 1e-6 * core::f64::consts::FRAC_1_PI * 180.0),
+    ("arcsec", 1e-6 * core::f64::consts::FRAC_1_PI * 180.0 * 3600.0),
+];
 const FORCE: &[Unit] = &[("N", 1.0), ("mN", 1e3), ("kN", 1e-3)];
 
 /// Every quantity of a record.
@@ -49,6 +57,16 @@ pub(crate) static QUANTITIES: [Quantity; 7] = [
     Quantity { name: "force_N", also: &["kraft"], units: FORCE },
     Quantity { name: "gauge_V", also: &[], units: VOLTAGE },
     Quantity { name: "reference_um", also: &["ref"], units: LENGTH },
+];
+
+/// The coordinates of a pose, in the order of a row.
+pub(crate) static COORDINATES: [Quantity; 6] = [
+    Quantity { name: "x_um", also: &[], units: LENGTH },
+    Quantity { name: "y_um", also: &[], units: LENGTH },
+    Quantity { name: "z_um", also: &[], units: LENGTH },
+    Quantity { name: "theta_x_urad", also: &["thetax", "rx", "θx"], units: ANGLE },
+    Quantity { name: "theta_y_urad", also: &["thetay", "ry", "θy"], units: ANGLE },
+    Quantity { name: "theta_z_urad", also: &["thetaz", "rz", "θz"], units: ANGLE },
 ];
 
 /// Names of a column with sample numbers.
@@ -103,6 +121,12 @@ impl Quantity {
         self.name.rsplit_once('_').map_or(self.name, |(plain, _)| plain)
     }
 
+    /// Whether `header` names this quantity without a unit.
+    pub(crate) fn is_named(&self, header: &str) -> bool {
+        let name = plain(header);
+        name == plain(self.plain()) || self.also.contains(&name.as_str())
+    }
+
     /// Its unit.
     pub(crate) fn unit(&self) -> &'static str {
         self.units[0].0
@@ -132,6 +156,12 @@ pub(crate) fn per_denominator(header: &str, denominator: &str) -> Result<f64, St
         (Some(_), Some(_)) => Err(own),
         _ => Ok(1.0),
     }
+}
+
+/// The unit in brackets at the end of a header, such as `um/s` of `vx (um/s)`.
+pub(crate) fn unit_in_brackets(header: &str) -> Option<String> {
+    let inner = |open, close| Some(header.trim().strip_suffix(close)?.rsplit_once(open)?.1);
+    inner('(', ')').or_else(|| inner('[', ']')).map(unit)
 }
 
 /// Whether a header names sample numbers.
@@ -176,6 +206,7 @@ fn unit(text: &str) -> String {
         "volt" | "volts" => "v".to_owned(),
         "sec" | "seconds" => "s".to_owned(),
         "micron" | "microns" => "um".to_owned(),
+        "°" | "degree" | "degrees" => "deg".to_owned(),
         _ => text,
     }
 }
@@ -209,6 +240,19 @@ mod tests {
         assert_eq!(per_denominator("CH2 (mV)", "V"), Ok(1e3));
         assert_eq!(per_denominator("CH2", "V"), Ok(1.0));
         assert_eq!(per_denominator("CH2 [um]", "V"), Err("um".to_owned()));
+        for (header, at, expected) in [
+            ("x (um)", 0, Some((Fit::OtherUnit, 1.0))),
+            ("X_MM", 0, Some((Fit::OtherUnit, 1e-3))),
+            ("rx [mrad]", 3, Some((Fit::OtherName, 1e-3))),
+            ("theta_z_rad", 5, Some((Fit::OtherName, 1e-6))),
+            ("theta_x", 3, None),
+            ("rx", 3, None),
+        ] {
+            assert_eq!(COORDINATES[at].fits(header), expected, "{header}");
+            assert_eq!(COORDINATES[at].is_named(header), expected.is_none(), "{header}");
+        }
+        let (_, per) = COORDINATES[4].fits("Ry deg").unwrap();
+        assert!((Conversion::unit(per).apply(180.0) * 1e-6 - core::f64::consts::PI).abs() < 1e-12, "{per}");
         assert!(is_unit("[µm]") && is_unit("Volts") && !is_unit("1") && is_sample_number("Sample"));
         assert_eq!(quantity("drive_V").unwrap().all_names(), "`drive_V`, `drive_mV`, `drive_uV`, `drive_kV`");
         assert_eq!(quantity("force_N").unwrap().all_names(), "`force_N`, `force_mN`, `force_kN`");
