@@ -183,3 +183,9 @@ pub(crate) fn later(time: &[f64], values: &[f64], delay: f64) -> Vec<f64> {
 #[cfg(test)]
 #[path = "record/tests/files.rs"]
 mod files;
+#[cfg(test)]
+#[path = "record/tests/labs.rs"]
+mod labs;
+#[cfg(test)]
+#[path = "record/tests/mat_file.rs"]
+mod mat_file;

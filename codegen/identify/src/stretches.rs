@@ -28,7 +28,11 @@ pub(crate) fn longest(time: &[f64], findings: &mut Findings) -> Option<Range<usi
     }
     // The first of equals.
     let longest = stretches.iter().rev().max_by_key(|stretch| stretch.len())?.clone();
-    if gap <= 0.0 || stretches.len() < 2 || longest.len() < LEAST {
+    // A time that is wrong looks like a run of a few samples.
+    let is_wrong = |pair: &[Range<usize>]| {
+        time[pair[1].start] < time[pair[0].end - 1] && pair.iter().any(|stretch| stretch.len() < LEAST)
+    };
+    if gap <= 0.0 || stretches.len() < 2 || longest.len() < LEAST || stretches.windows(2).any(is_wrong) {
         return None;
     }
     let shown = |stretch: &Range<usize>| format!("{} s to {} s", time[stretch.start], time[stretch.end - 1]);
@@ -68,6 +72,7 @@ mod tests {
         let mut swapped: Vec<f64> = run(0.0, 300).collect();
         swapped.swap(100, 101);
         swapped[200] = swapped[199];
+        swapped[250] = 0.01;
         assert_eq!(found(&swapped), (None, 0));
         assert_eq!(found(&[]), (None, 0));
     }
