@@ -173,7 +173,7 @@ fn time_that_does_not_rise_is_named_by_its_line_and_time() {
     let folder = prepared();
     folder.write(BAD, changed(|rows| rows[300..].iter_mut().for_each(|row| row[0] -= 20.0)));
     for document in met(&folder) {
-        assert!(document.finding("N0523")["message"].as_str().unwrap().contains("begins anew"), "{:#}", document.value);
+        assert!(document.finding("N0523")["message"].as_str().unwrap().contains("starts again"), "{:#}", document.value);
     }
 }
 

@@ -177,7 +177,7 @@ fn read_text(path: &Path, findings: &mut Findings) -> Option<String> {
 
 /// The table `series` of a data file, or else the longest; `None` after the reason was reported.
 pub(crate) fn open_file(path: &Path, series: Option<&str>, findings: &mut Findings) -> Option<Source<'static>> {
-    let mut begin = || -> Result<_, ReadError> {
+    let begin = || -> Result<_, ReadError> {
         let (mut file, mut first) = (files::open_file(path)?, Vec::new());
         (&mut file).take(Kind::TELLING as u64).read_to_end(&mut first)?;
         file.rewind()?;

@@ -1,5 +1,5 @@
 //! Stretches of a record: the samples between gaps, as a logger leaves them when it empties its buffer, and the runs of a
-//! file in which time begins anew.
+//! file in which time starts again.
 
 use std::ops::Range;
 
@@ -40,7 +40,7 @@ pub(crate) fn longest(time: &[f64], findings: &mut Findings) -> Option<Range<usi
     let more = others.len().saturating_sub(NAMED);
     let more = if more > 0 { format!(" and {more} more") } else { String::new() };
     let message = format!(
-        "time has gaps or begins anew: the longest stretch without, from {} ({} samples), is read; not read: {}{more}",
+        "time has gaps or starts again: the longest stretch without, from {} ({} samples), is read; not read: {}{more}",
         shown(&longest),
         longest.len(),
         others[..others.len().min(NAMED)].join(", ")

@@ -160,7 +160,7 @@ pub(crate) fn per_denominator(header: &str, denominator: &str) -> Result<f64, St
 
 /// The unit in brackets at the end of a header, such as `um/s` of `vx (um/s)`.
 pub(crate) fn unit_in_brackets(header: &str) -> Option<String> {
-    let inner = |open, close| Some(header.trim().strip_suffix(close)?.rsplit_once(open)?.1);
+    let inner = |open: char, close: char| Some(header.trim().strip_suffix(close)?.rsplit_once(open)?.1);
     inner('(', ')').or_else(|| inner('[', ']')).map(unit)
 }
 

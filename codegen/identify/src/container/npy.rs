@@ -42,7 +42,7 @@ pub(super) fn contents(file: &[u8]) -> Result<Contents, String> {
             bytes
         } else {
             of_field = bytes.chunks_exact(width.max(1)).flat_map(|row| &row[at..at + form.1]).copied().collect();
-            &of_field
+            &of_field[..]
         };
         at += form.1;
         match form.0 {

@@ -156,7 +156,7 @@ impl Search<'_> {
         let rate = missing.contains(&TIME) && (counts_samples || free.len() < missing.len());
         let missing: Vec<_> = missing.iter().copied().filter(|name| !(rate && *name == TIME)).collect();
         let mut places: Vec<Option<usize>> = Vec::new();
-        for name in &missing {
+        for &name in &missing {
             let place = self.near(name).filter(|at| free.contains(at));
             free.retain(|at| Some(*at) != place);
             places.push(place);
@@ -165,7 +165,7 @@ impl Search<'_> {
         let entries: Option<Vec<String>> = missing
             .iter()
             .zip(places)
-            .map(|(name, place)| Some(self.entry(name, place.or_else(|| free.next())?)))
+            .map(|(&name, place)| Some(self.entry(name, place.or_else(|| free.next())?)))
             .collect();
         let entries = entries?;
         let kept: Vec<String> = self.reading.given().map(str::to_owned).chain(entries).collect();

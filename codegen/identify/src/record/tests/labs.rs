@@ -135,7 +135,7 @@ fn stretches_between_gaps_and_joined_runs_are_records() {
     assert!(note(&record).contains("0 s to 0.099 s"), "{}", note(&record));
     let whole = file("time_s,drive_V,displacement_um", |[t, u, y]| format!("{t},{u},{y}"));
     let joined = whole.clone() + &whole.lines().skip(1).take(150).collect::<Vec<_>>().join("\n");
-    assert!(note(&assert_same("joined", read(joined.as_bytes(), &[], None))).contains("begins anew"));
+    assert!(note(&assert_same("joined", read(joined.as_bytes(), &[], None))).contains("starts again"));
 }
 
 #[test]
