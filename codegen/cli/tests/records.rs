@@ -173,7 +173,11 @@ fn time_that_does_not_rise_is_named_by_its_line_and_time() {
     let folder = prepared();
     folder.write(BAD, changed(|rows| rows[300..].iter_mut().for_each(|row| row[0] -= 20.0)));
     for document in met(&folder) {
-        assert!(document.finding("N0523")["message"].as_str().unwrap().contains("starts again"), "{:#}", document.value);
+        assert!(
+            document.finding("N0523")["message"].as_str().unwrap().contains("starts again"),
+            "{:#}",
+            document.value
+        );
     }
 }
 
@@ -194,7 +198,8 @@ fn a_record_in_another_unit_of_time_is_named() {
 
 #[test]
 fn a_gap_is_named_by_its_times() {
-    let bursts = changed(|rows| *rows = rows.chunks(60).flat_map(|part| &part[..part.len().min(40)]).copied().collect());
+    let bursts =
+        changed(|rows| *rows = rows.chunks(60).flat_map(|part| &part[..part.len().min(40)]).copied().collect());
     let between = &["nothing was recorded between 3.046875 s and 4.6875 s", "21 sampling intervals"];
     refused(bursts, &expect(42, "E0511", between, "without gaps"));
 }

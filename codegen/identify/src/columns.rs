@@ -149,7 +149,15 @@ pub(crate) fn open_part<'a>(
         return findings.refuse(format.value, Some(line), message, &help);
     }
     input.put_back(ahead);
-    let lines = Lines { format, names: head.names.len(), separator: head.separator, decimal: None, simulated, last: part.last, input };
+    let lines = Lines {
+        format,
+        names: head.names.len(),
+        separator: head.separator,
+        decimal: None,
+        simulated,
+        last: part.last,
+        input,
+    };
     Some((head, lines))
 }
 

@@ -161,9 +161,13 @@ fn tables(contents: Contents) -> Tables {
     tables.sort_by_key(|(order, _)| *order);
     let mut tables: Vec<Table> = tables.into_iter().map(|(_, table)| table).collect();
     let is_single = |table: &Table| table.columns.len() < 2;
-    left_out.extend(tables.iter().filter(|table| is_single(table)).flat_map(|table| &table.columns).map(
-        |(name, values)| format!("`{name}` ({} numbers)", values.len()),
-    ));
+    left_out.extend(
+        tables
+            .iter()
+            .filter(|table| is_single(table))
+            .flat_map(|table| &table.columns)
+            .map(|(name, values)| format!("`{name}` ({} numbers)", values.len())),
+    );
     tables.retain(|table| !is_single(table));
     Tables { tables, left_out }
 }
@@ -192,7 +196,8 @@ impl Channels {
                 values.iter().skip(k).step_by(width).copied().collect()
             }
         };
-        let named = |k: usize| if name.is_empty() { format!("column {}", k + 1) } else { format!("{name}(:,{})", k + 1) };
+        let named =
+            |k: usize| if name.is_empty() { format!("column {}", k + 1) } else { format!("{name}(:,{})", k + 1) };
         (0..width).map(|k| (named(k), column(k))).collect()
     }
 }

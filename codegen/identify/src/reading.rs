@@ -109,7 +109,13 @@ fn column_choice(text: String) -> Result<ColumnChoice, String> {
         return Err(expected());
     }
     if name == SAMPLE {
-        return Ok(ColumnChoice { text, quantity: SAMPLE, column, conversion: Some(Conversion::unit(1.0)), scaled: None });
+        return Ok(ColumnChoice {
+            text,
+            quantity: SAMPLE,
+            column,
+            conversion: Some(Conversion::unit(1.0)),
+            scaled: None,
+        });
     }
     let found = QUANTITIES.iter().find_map(|quantity| match quantity.per_of(&name) {
         Some(per) => Some((quantity, Some(per))),

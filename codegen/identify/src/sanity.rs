@@ -4,8 +4,8 @@ use super::columns::LineNumbers;
 use super::findings::Findings;
 use super::least_squares::dot;
 use super::limits;
-use super::stretches::GAP;
 use super::statistics::{Standstill, centred, extent, median, micrometres, standstills};
+use super::stretches::GAP;
 use specgen_language::diagnostic::codes;
 
 /// Least number of samples of a record.

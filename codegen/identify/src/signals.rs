@@ -9,8 +9,8 @@ use super::file::{Source, open_file};
 use super::findings::Findings;
 use super::reading::Reading;
 use super::sanity;
-use super::stretches;
 use super::statistics::{self, Standstill, standstills};
+use super::stretches;
 use specgen_language::diagnostic::{Diagnostic, codes};
 
 /// A column that a record may have.
@@ -66,10 +66,8 @@ pub enum Input<'a> {
 pub(crate) fn read(input: Input, shown_as: &str, wanted: &[ColumnSpec]) -> Result<Signals, Vec<Diagnostic>> {
     let mut findings = Findings::new(shown_as);
     let signals = match input {
-        Input::File(path, reading) => {
-            open_file(path, reading.series(), &mut findings)
-                .and_then(|file| checked(file, wanted, reading, &mut findings))
-        }
+        Input::File(path, reading) => open_file(path, reading.series(), &mut findings)
+            .and_then(|file| checked(file, wanted, reading, &mut findings)),
         Input::Text(text) => Source::of_text(text.as_bytes(), None, &mut findings)
             .and_then(|text| checked(text, wanted, &Reading::default(), &mut findings)),
     };

@@ -11,8 +11,7 @@ pub type State = [[f64; 6]; 3];
 
 const FORMAT: Format = Format { preamble: false, ..RECORD };
 const COLUMNS: usize = 18;
-const HELP: &str =
-    "write 18 names, of pose, rate and acceleration in x, y, z, θx, θy, θz, such as `x,y,z,rx,ry,rz,vx,…` or `x (um),…`";
+const HELP: &str = "write 18 names, of pose, rate and acceleration in x, y, z, θx, θy, θz, such as `x,y,z,rx,ry,rz,vx,…` or `x (um),…`";
 
 /// States from the text of their file, in order.
 ///
@@ -88,9 +87,13 @@ mod tests {
         };
         let names = (0..18).map(name).collect::<Vec<_>>().join(",");
         let [pose, rate, acceleration] = parse(&format!("{names}\n{}\n", ["180"; 18].join(",")), "s.csv").unwrap()[0];
-        for (value, expected) in
-            [(pose[0], 180e-6), (pose[1], 180.0), (pose[5], core::f64::consts::PI), (rate[0], 0.18), (acceleration[2], 180e-6)]
-        {
+        for (value, expected) in [
+            (pose[0], 180e-6),
+            (pose[1], 180.0),
+            (pose[5], core::f64::consts::PI),
+            (rate[0], 0.18),
+            (acceleration[2], 180e-6),
+        ] {
             assert!((value / expected - 1.0).abs() < 1e-12, "{value} {expected}");
         }
         let found = parse(&format!("{}\n{}\n", names.replace("mm/s", "mm"), row("0")), "s.csv").unwrap_err();

@@ -59,21 +59,22 @@ pub(crate) fn choose(
         });
     }
     // The first of equals.
-    let chosen = all
-        .iter()
-        .enumerate()
-        .rev()
-        .max_by_key(|(_, table)| (is_known(table), table.rows))
-        .map(|(index, _)| index)?;
+    let chosen =
+        all.iter().enumerate().rev().max_by_key(|(_, table)| (is_known(table), table.rows)).map(|(index, _)| index)?;
     let mut parts = Vec::new();
     if all.len() > 1 {
-        parts.push(format!("table {} is read; not read: {}", all[chosen].in_words(chosen), listed(&words(Some(chosen)))));
+        parts.push(format!(
+            "table {} is read; not read: {}",
+            all[chosen].in_words(chosen),
+            listed(&words(Some(chosen)))
+        ));
     }
     if !left_out.is_empty() {
         parts.push(format!("left out: {}", listed(left_out)));
     }
     if !parts.is_empty() {
-        let help = if all.len() > 1 { "`--series N` reads another table" } else { "check that the record needs none of them" };
+        let help =
+            if all.len() > 1 { "`--series N` reads another table" } else { "check that the record needs none of them" };
         findings.add(codes::RECORD_PART, None, parts.join("; "), help);
     }
     Some(chosen)
@@ -85,8 +86,11 @@ mod tests {
 
     #[test]
     fn the_longest_table_is_read_unless_the_user_names_one() {
-        let table = |name: &str, rows, first_line| {
-            Extent { name: name.to_owned(), rows, columns: vec!["a".to_owned()], first_line: Some(first_line) }
+        let table = |name: &str, rows, first_line| Extent {
+            name: name.to_owned(),
+            rows,
+            columns: vec!["a".to_owned()],
+            first_line: Some(first_line),
         };
         let all = [table("R, C", 3, 2), table("20 Hz", 500, 8), table("40 Hz", 500, 600)];
         let choose = |series: Option<&str>| {
@@ -102,6 +106,9 @@ mod tests {
         assert_eq!(choose(Some("3")), (Some(2), Vec::new()));
         assert_eq!(choose(Some("40 hz")), (Some(2), Vec::new()));
         let (found, refused) = choose(Some("4"));
-        assert!(found.is_none() && refused[0].code == "E0504" && refused[0].message.contains("1 `R, C`"), "{refused:?}");
+        assert!(
+            found.is_none() && refused[0].code == "E0504" && refused[0].message.contains("1 `R, C`"),
+            "{refused:?}"
+        );
     }
 }

@@ -43,7 +43,11 @@ fn records_in_other_forms_are_read_as_they_are() {
 fn npy(rows: &[[f64; 3]]) -> Vec<u8> {
     let header = format!("{{'descr': '<f8', 'fortran_order': False, 'shape': ({}, 3), }}\n", rows.len());
     let values = rows.iter().flatten().flat_map(|value| value.to_le_bytes());
-    [b"\x93NUMPY\x01\0", &(header.len() as u16).to_le_bytes()[..], header.as_bytes()].concat().into_iter().chain(values).collect()
+    [b"\x93NUMPY\x01\0", &(header.len() as u16).to_le_bytes()[..], header.as_bytes()]
+        .concat()
+        .into_iter()
+        .chain(values)
+        .collect()
 }
 
 /// Files that need options: those of every message are given, and the file is read.
@@ -58,9 +62,7 @@ fn suggested_options_are_accepted() {
         let line = |row: &[f64; 3]| row.map(|value| value.to_string()).join(separator) + "\n";
         (header.to_owned() + &rows.iter().map(line).collect::<String>()).into_bytes()
     };
-    let untimed = |separator: &str| {
-        rows.iter().map(|[_, u, y]| format!("{u}{separator}{y}\n")).collect::<String>()
-    };
+    let untimed = |separator: &str| rows.iter().map(|[_, u, y]| format!("{u}{separator}{y}\n")).collect::<String>();
     let numbered = rows.iter().enumerate().map(|(k, [_, u, y])| format!("{k};{u};{y}\n")).collect::<String>();
     let empty_first = rows.iter().map(|[t, u, y]| format!(",{t},{u},{y}\n")).collect::<String>();
     let files: [(&str, Vec<u8>); 12] = [
@@ -83,7 +85,8 @@ fn suggested_options_are_accepted() {
         let identify = ["--drive", "0:100", "--grid", "4"];
         let (code, said) = run(&folder, &["identify"], name, &identify);
         assert_eq!(code, 1, "{name}: {said}");
-        let options: Vec<&str> = said.split('`').filter(|text| text.starts_with("--")).filter(|text| text.contains(' ')).collect();
+        let options: Vec<&str> =
+            said.split('`').filter(|text| text.starts_with("--")).filter(|text| text.contains(' ')).collect();
         assert!(!options.is_empty(), "{name}: {said}");
         for options in options {
             let line = format!("specgen identify {name} --drive 0:100 --grid 4 {}", options.replace("HZ", "12.8"));

@@ -73,7 +73,9 @@ fn at_line(lines: &[Line], at: usize, interval: Option<f64>) -> Head {
     }
     let rows = lines[next..].iter().find_map(|(_, line)| Some((separator_of(line)?, line)));
     let separator = rows.map_or_else(|| of_names(text), |(separator, _)| separator);
-    if rows.is_some_and(|(separator, row)| names.len() == 2 * split(row, separator).len()) && names[1..].iter().step_by(2).all(|unit| names::is_unit(unit)) {
+    if rows.is_some_and(|(separator, row)| names.len() == 2 * split(row, separator).len())
+        && names[1..].iter().step_by(2).all(|unit| names::is_unit(unit))
+    {
         // `Time,s,Ch1,V` above columns that commas separate.
         names = names.chunks(2).map(|pair| pair.join(",")).collect();
     }

@@ -110,7 +110,9 @@ impl Open {
 
     /// Whether a line is one of its rows: quickly, as every line of a long text is looked at.
     fn has_row(&self, line: &[u8]) -> bool {
-        let is_part = |byte: &u8| matches!(byte, b'0'..=b'9' | b'+' | b'-' | b'.' | b',' | b'e' | b'E' | b' ' | b'\t' | b';' | b'\r');
+        let is_part = |byte: &u8| {
+            matches!(byte, b'0'..=b'9' | b'+' | b'-' | b'.' | b',' | b'e' | b'E' | b' ' | b'\t' | b';' | b'\r')
+        };
         line.iter().all(is_part) || is_row(line, self.separator)
     }
 

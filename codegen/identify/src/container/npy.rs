@@ -70,17 +70,21 @@ fn value<'a>(header: &'a str, key: &str) -> Result<&'a str, String> {
 fn fields(text: &str) -> Result<Vec<Field>, String> {
     if let Some(list) = text.strip_prefix('[') {
         let list = list.split_once(']').ok_or(DAMAGED)?.0;
-        return list.split('(').skip(1).map(|field| {
-            let mut words = field.split('\'').skip(1).step_by(2);
-            let (Some(name), Some(form), None) = (words.next(), words.next(), words.next()) else {
-                return Err("it has fields of more than one number".to_owned());
-            };
-            // Behind the format there may be a shape.
-            if field.rsplit('\'').next().is_some_and(|rest| rest.contains(|c: char| c.is_ascii_digit())) {
-                return Err("it has fields of more than one number".to_owned());
-            }
-            of_form(name, form)
-        }).collect();
+        return list
+            .split('(')
+            .skip(1)
+            .map(|field| {
+                let mut words = field.split('\'').skip(1).step_by(2);
+                let (Some(name), Some(form), None) = (words.next(), words.next(), words.next()) else {
+                    return Err("it has fields of more than one number".to_owned());
+                };
+                // Behind the format there may be a shape.
+                if field.rsplit('\'').next().is_some_and(|rest| rest.contains(|c: char| c.is_ascii_digit())) {
+                    return Err("it has fields of more than one number".to_owned());
+                }
+                of_form(name, form)
+            })
+            .collect();
     }
     let form = text.strip_prefix('\'').and_then(|rest| rest.split_once('\'')).ok_or(DAMAGED)?.0;
     Ok(vec![of_form("", form)?])
@@ -92,7 +96,9 @@ fn of_form(name: &str, text: &str) -> Result<Field, String> {
     let is_big_endian = text.starts_with('>');
     let text = text.trim_start_matches(['<', '>', '|', '=']);
     let mut letters = text.chars();
-    let (Some(kind), Ok(width)) = (letters.next(), letters.as_str().parse::<usize>()) else { return Err(unsupported()) };
+    let (Some(kind), Ok(width)) = (letters.next(), letters.as_str().parse::<usize>()) else {
+        return Err(unsupported());
+    };
     let bytes = match kind {
         'U' => width.checked_mul(4).ok_or_else(unsupported)?,
         _ => width,

@@ -61,7 +61,15 @@ impl Drive {
     #[must_use]
     pub fn of_voltage(shown_as: &str, time: Vec<f64>, voltage: Vec<f64>) -> Self {
         let weightless = vec![false; time.len()];
-        Self { shown_as: shown_as.to_owned(), time, drive: voltage, displacement: None, weightless, held: 0.0, warnings: Vec::new() }
+        Self {
+            shown_as: shown_as.to_owned(),
+            time,
+            drive: voltage,
+            displacement: None,
+            weightless,
+            held: 0.0,
+            warnings: Vec::new(),
+        }
     }
 }
 

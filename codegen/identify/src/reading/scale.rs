@@ -55,9 +55,13 @@ pub(super) fn parse(text: &str, quantity: &Quantity, per: Option<f64>) -> Result
     }))
 }
 
-/// The number at the beginning of a text, and the rest.
+/// The number at the beginning of a text, and the rest. Blanks may follow its sign.
 fn number(text: &str) -> Option<(f64, &str)> {
     let text = text.trim_start();
+    if let Some(rest) = text.strip_prefix(['+', '-']).filter(|rest| rest.starts_with(' ')) {
+        let (size, rest) = number(rest).filter(|_| !rest.trim_start().starts_with(['+', '-']))?;
+        return Some((if text.starts_with('-') { -size } else { size }, rest));
+    }
     let end = text.find(|c: char| !matches!(c, '0'..='9' | '+' | '-' | '.' | 'e' | 'E')).unwrap_or(text.len());
     (1..=end).rev().find_map(|end| Some((text[..end].parse().ok()?, &text[end..])))
 }

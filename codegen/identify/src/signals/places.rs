@@ -170,7 +170,8 @@ impl Search<'_> {
         let entries = entries?;
         let kept: Vec<String> = self.reading.given().map(str::to_owned).chain(entries).collect();
         let columns = shell::quoted(&kept.join(","));
-        let options = [(!kept.is_empty()).then(|| format!("--columns {columns}")), rate.then(|| "--rate HZ".to_owned())];
+        let options =
+            [(!kept.is_empty()).then(|| format!("--columns {columns}")), rate.then(|| "--rate HZ".to_owned())];
         Some(options.into_iter().flatten().collect::<Vec<_>>().join(" ")).filter(|options| !options.is_empty())
     }
 
@@ -186,9 +187,8 @@ impl Search<'_> {
     /// How `--columns` names a column: by its header, unless that has a letter with a meaning there or in a message.
     fn word(&self, at: usize) -> String {
         let names = &self.header.names;
-        let is_plain = |name: &&String| {
-            !name.is_empty() && !name.contains(['=', '`', '\'', '\n']) && self.at(name) == Some(at)
-        };
+        let is_plain =
+            |name: &&String| !name.is_empty() && !name.contains(['=', '`', '\'', '\n']) && self.at(name) == Some(at);
         names.get(at).filter(is_plain).cloned().unwrap_or_else(|| (at + 1).to_string())
     }
 
