@@ -121,7 +121,7 @@ fn columns() {
     assert!(all[0].help.contains("`displacement_nm`"), "{all:?}");
     let all = errors(text.replacen("time_s,drive_V,displacement_um", "a,b,c", 1).as_bytes());
     assert_eq!(all.len(), 3, "all three columns are reported: {all:?}");
-    assert!(all[0].help.contains("--columns time_s=COLUMN"));
+    assert!(all[0].help.contains("--columns time_s=a,drive_V=b,displacement_um=c"), "{all:?}");
 }
 
 #[test]
@@ -151,7 +151,17 @@ fn time() {
     let gap = changed(|r| {
         r.drain(300..350);
     });
-    assert_eq!(expect(&errors(gap.as_bytes()), "E0511", "between 2.99 s and 3.5 s"), Some(302));
+    let record = read(gap.as_bytes()).unwrap();
+    assert_eq!((record.time[0], record.warnings[0].code), (3.5, "N0523"), "{:?}", record.warnings);
+    assert!(record.warnings[0].message.contains("0 s to 2.99 s"), "{:?}", record.warnings);
+    let mut k = 0;
+    let bursts = changed(|r| {
+        r.retain(|_| {
+            k += 1;
+            k % 100 <= 60
+        });
+    });
+    assert_eq!(expect(&errors(bursts.as_bytes()), "E0511", "between 0.59 s and 0.99 s"), Some(62));
     expect(&errors(changed(|r| r.truncate(50)).as_bytes()), "E0509", "has 50 samples");
 }
 

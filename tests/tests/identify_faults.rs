@@ -90,6 +90,29 @@ fn a_stuck_gauge_is_named_with_the_time() {
     expect(&stuck(2e-9), "E0516", "from 15.");
 }
 
+/// After a rest, in a staircase and from the middle of a sine on, a gauge that is a sample late is not stuck.
+#[test]
+fn a_gauge_that_lags_a_step_is_accepted() {
+    let table = random_table(8, RANGE, 40e-6, 0.3, 7);
+    let sine = |k: i32| 50.0 + 45.0 * (1.0 + 0.03 * f64::from(k)).sin();
+    let steps = [0.0, 25.0, 50.0, 75.0, 100.0, 75.0, 50.0, 25.0];
+    let rest = [0.0; 500];
+    let drives = [
+        [&rest[..], &[60.0; 300], &rest].concat(),
+        rest.iter().copied().chain((0..1000).map(sine)).collect(),
+        (0..2400).map(|k| steps[k / 100 % 8]).collect(),
+    ];
+    for drive in drives {
+        let response = response(&table, &drive);
+        // Resolution 1 nm: at rest the gauge reads the same again and again.
+        let late = std::iter::once(response[0]).chain(response).map(|y| (y / 1e-9).round() * 1e-9);
+        let displacement: Vec<f64> = late.take(drive.len()).collect();
+        let time = (0..drive.len()).map(|k| k as f64 / RATE).collect();
+        let record = Columns { time, drive, displacement }.record();
+        assert!(record.is_ok(), "{:#?}", record.unwrap_err());
+    }
+}
+
 #[test]
 fn units_and_swapped_columns_are_named_with_times() {
     let all = with(|c| c.displacement.iter_mut().for_each(|y| *y *= 1e3)).unwrap_err();

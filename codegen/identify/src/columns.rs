@@ -7,17 +7,20 @@ pub(crate) mod foreign;
 mod head;
 mod lines;
 pub(crate) mod names;
+mod scan;
 
 use std::io::Read;
 
 use super::findings::Findings;
 use head::{decoded, has_fields, is_mark, split};
 use lines::LineReader;
+use names::Conversion;
 use specgen_language::diagnostic::{Code, codes};
 use specgen_language::interrupt;
 
 pub(crate) use head::Head;
 pub(crate) use lines::LineNumbers;
+pub(crate) use scan::{Part, tables};
 
 /// Codes and texts for the mistakes in a kind of file.
 #[derive(Debug)]
@@ -56,8 +59,8 @@ pub(crate) struct Column<'a> {
     pub(crate) at: usize,
     /// Its name for messages.
     pub(crate) name: &'a str,
-    /// Number of the column's units in one unit of the quantity.
-    pub(crate) per: f64,
+    /// To the unit of the quantity.
+    pub(crate) conversion: Conversion,
 }
 
 /// The lines after the header.
@@ -69,6 +72,8 @@ pub(crate) struct Lines<'a> {
     decimal: Option<char>,
     /// Whether an earlier line marked the file as simulated.
     simulated: bool,
+    /// The last line of the table, if others follow.
+    last: Option<usize>,
     input: LineReader<'a>,
 }
 
@@ -105,13 +110,25 @@ pub(crate) fn open<'a>(
     format: &'a Format,
     findings: &mut Findings,
 ) -> Option<(Head, Lines<'a>)> {
+    open_part(source, Part::WHOLE, format, findings)
+}
+
+/// Reads the head of a table in a text; `None` after the problem was reported.
+pub(crate) fn open_part<'a>(
+    source: impl Read + 'a,
+    part: Part,
+    format: &'a Format,
+    findings: &mut Findings,
+) -> Option<(Head, Lines<'a>)> {
     let mut input = LineReader::new(source);
-    let mut ahead = match input.head(head::LINES) {
+    let ahead = input.skip_to(part.from, is_mark).and_then(|marked| Ok((input.head(head::LINES)?, marked)));
+    let (mut ahead, marked) = match ahead {
         Ok(lines) => lines,
         Err(e) => {
             return findings.refuse(format.header, None, format!("cannot be read: {e}"), "write plain CSV");
         }
     };
+    ahead.retain(|(line, _)| part.last.is_none_or(|last| *line <= last));
     if let Some((number, line)) = ahead.first() {
         if foreign::report(line, findings) {
             return None;
@@ -125,13 +142,22 @@ pub(crate) fn open<'a>(
     if found.is_none() && format.preamble {
         return findings.refuse(format.header, None, "is empty".to_owned(), EMPTY);
     }
-    let head = found.unwrap_or(Head { names: Vec::new(), line: 1, interval: None, next: ahead.len(), separator: b',' });
-    let simulated = ahead.drain(..head.next).any(|(_, line)| is_mark(&line));
+    let mut head = found.unwrap_or_else(|| Head { next: ahead.len(), ..Head::without_names(1, b',') });
+    let simulated = ahead.drain(..head.next).fold(marked, |marked, (_, line)| marked | is_mark(&line));
+    head.find_filled(&ahead);
     if let Some((line, message, help)) = head.ambiguous_commas(&ahead).filter(|_| format.preamble) {
         return findings.refuse(format.value, Some(line), message, &help);
     }
     input.put_back(ahead);
-    let lines = Lines { format, names: head.names.len(), separator: head.separator, decimal: None, simulated, input };
+    let lines = Lines {
+        format,
+        names: head.names.len(),
+        separator: head.separator,
+        decimal: None,
+        simulated,
+        last: part.last,
+        input,
+    };
     Some((head, lines))
 }
 
@@ -152,8 +178,8 @@ impl Lines<'_> {
         loop {
             interrupt::point();
             let line = match self.input.next(&mut text) {
-                Ok(Some(line)) => line,
-                Ok(None) => break,
+                Ok(Some(line)) if self.last.is_none_or(|last| line <= last) => line,
+                Ok(_) => break,
                 Err(e) => {
                     findings.add(self.format.value, None, format!("cannot be read on: {e}"), "write plain CSV");
                     break;
@@ -181,7 +207,7 @@ impl Lines<'_> {
             }
             for (column, wanted) in columns.iter_mut().zip(wanted) {
                 let value = self.number(fields.get(wanted.at).copied(), line, wanted.name, findings);
-                column.push(value / wanted.per);
+                column.push(wanted.conversion.apply(value));
             }
             if fields.len() > self.names && !self.format.longer_lines {
                 let message = format!("has {} values, expected {}", fields.len(), self.names);
@@ -242,6 +268,6 @@ impl Format {
 impl<'a> Column<'a> {
     /// A column in the unit of the quantity.
     pub(crate) const fn plain(at: usize, name: &'a str) -> Self {
-        Self { at, name, per: 1.0 }
+        Self { at, name, conversion: Conversion::unit(1.0) }
     }
 }

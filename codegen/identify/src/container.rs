@@ -1,30 +1,75 @@
-//! Records in files of MATLAB, HDF5 and TDMS: their columns as lines of text, which are then read as in any other file.
+//! Records in files of MATLAB, HDF5, TDMS and NumPy: their arrays as columns of tables, which are then read as lines of
+//! text like any other file.
 //!
-//! Columns are the named arrays of numbers with the most values; shorter arrays are metadata and left out. Numbers are
-//! written so that they read back to the bit.
+//! Arrays of one length are the columns of a table; a matrix gives one for each of its columns. Numbers are written so
+//! that they read back to the bit.
 
 mod bytes;
+mod hdf5;
 mod mat;
+mod npy;
 mod tdms;
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
-use std::fs::File;
 use std::io::{self, Read};
-use std::path::Path;
+
+use super::tables::{Extent, listed};
+use specgen_language::files::MAX_BYTES as LARGEST;
 
 /// Names and values.
 type Columns = Vec<(String, Vec<f64>)>;
+
+/// An array of numbers.
+struct Array {
+    /// Struct or group that it belongs to; empty for the file itself.
+    group: String,
+    /// Empty if it has none.
+    name: String,
+    /// Its dimensions, of which the first varies fastest.
+    size: Vec<usize>,
+    values: Vec<f64>,
+}
+
+/// What is in a file.
+#[derive(Default)]
+struct Contents {
+    arrays: Vec<Array>,
+    /// Name and kind of everything else.
+    others: Vec<(String, String)>,
+}
+
+/// Tables of a file, and what is in none of them.
+pub(crate) struct Tables {
+    pub(crate) tables: Vec<Table>,
+    /// Names, each with what it is.
+    pub(crate) left_out: Vec<String>,
+}
+
+/// Columns of equal length.
+pub(crate) struct Table {
+    /// The struct or group that has them, or the first array.
+    name: String,
+    columns: Columns,
+}
 
 /// Kind of a file by its first bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Kind {
     /// MAT-file of version 5.
     Mat,
-    /// HDF5, including MAT-files of version 7.3, which have an additional header.
+    /// MAT-file of version 7.3: HDF5 with an additional header.
+    Mat73,
+    /// HDF5.
     Hdf5,
     /// TDMS.
     Tdms,
+    /// An array of NumPy.
+    Npy,
 }
+
+/// Columns of a matrix from here on are an image, not channels.
+const WIDEST: usize = 64;
 
 impl Kind {
     /// Bytes that tell.
@@ -34,65 +79,161 @@ impl Kind {
     pub(crate) fn of(first: &[u8]) -> Option<Self> {
         let kinds = [
             (&b"MATLAB 5.0 MAT-file"[..], Self::Mat),
-            (b"MATLAB 7.3 MAT-file", Self::Hdf5),
+            (b"MATLAB 7.3 MAT-file", Self::Mat73),
             (b"\x89HDF\r\n\x1a\n", Self::Hdf5),
             (b"TDSm", Self::Tdms),
+            (b"\x93NUMPY", Self::Npy),
         ];
         kinds.into_iter().find(|(magic, _)| first.starts_with(magic)).map(|(_, kind)| kind)
     }
 
-    /// The columns of `file`, which lies at `path`, as lines.
+    /// The kind in words.
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::Mat => "a MAT-file of version 5",
+            Self::Mat73 => "a MAT-file of version 7.3",
+            Self::Hdf5 => "an HDF5 file",
+            Self::Tdms => "a TDMS file of LabVIEW",
+            Self::Npy => "an array of NumPy",
+        }
+    }
+
+    /// The tables of `file`.
     ///
     /// # Errors
     /// Reason why it has none, as a text that follows the name of the file.
-    pub(crate) fn open(self, mut file: File, path: &Path) -> Result<Lines, String> {
-        let mut whole = || -> Result<Vec<u8>, String> {
-            let mut bytes = Vec::new();
-            file.read_to_end(&mut bytes).map_err(|error| error.to_string())?;
-            Ok(bytes)
+    pub(crate) fn tables(self, file: Vec<u8>) -> Result<Tables, String> {
+        let contents = match self {
+            Self::Mat => mat::contents(&file),
+            Self::Mat73 | Self::Hdf5 => hdf5::contents(file),
+            Self::Tdms => tdms::contents(&file),
+            Self::Npy => npy::contents(&file),
         };
-        let columns = match self {
-            Self::Mat => whole().and_then(|file| mat::columns(&file)),
-            Self::Hdf5 => of_hdf5(path),
-            Self::Tdms => whole().and_then(|file| tdms::columns(&file)),
-        };
-        let mut columns = columns.map_err(|error| format!("cannot be read: {error}"))?;
-        let longest = columns.iter().map(|(_, values)| values.len()).max().unwrap_or(0);
-        columns.retain(|(_, values)| values.len() == longest);
-        if longest < 2 || columns.len() < 2 {
-            return Err("has no two arrays of numbers, one for each column".to_owned());
+        let found = tables(contents.map_err(|error| format!("cannot be read: {error}"))?);
+        if !found.tables.is_empty() {
+            return Ok(found);
         }
-        Ok(Lines::new(columns))
+        let there = if found.left_out.is_empty() { "nothing".to_owned() } else { listed(&found.left_out) };
+        Err(format!("has no two arrays of numbers of one length for the columns, but {there}"))
     }
 }
 
-/// Whether an array has exactly one dimension larger than 1.
-fn is_column<N: Copy + PartialOrd + From<u8>>(size: &[N]) -> bool {
-    size.iter().filter(|length| **length > N::from(1)).count() <= 1
+/// Number of samples and of columns of an array of one or two dimensions.
+fn length_and_width(size: &[usize]) -> Option<[usize; 2]> {
+    let long: Vec<usize> = size.iter().copied().filter(|length| *length > 1).collect();
+    match long[..] {
+        [length] => Some([length, 1]),
+        [a, b] if a.min(b) < WIDEST => Some([a.max(b), a.min(b)]),
+        _ => None,
+    }
 }
 
-/// Datasets of the root, and of its groups if the root has no column.
-fn of_hdf5(path: &Path) -> Result<Columns, String> {
-    let said = |error: hdf5_pure::Error| error.to_string();
-    let file = hdf5_pure::File::open(path).map_err(said)?;
-    let read = |names: Vec<String>, of: &dyn Fn(&str) -> Result<hdf5_pure::Dataset, hdf5_pure::Error>| -> Columns {
-        // Texts and tables are not columns.
-        let column = |name: String| {
-            let data = of(&name).ok()?;
-            is_column(&data.shape().ok()?).then(|| data.read_f64().ok())?.map(|values| (name, values))
-        };
-        names.into_iter().filter_map(column).collect()
-    };
-    let root = file.root();
-    let mut columns = read(root.datasets().map_err(said)?, &|name| root.dataset(name));
-    if columns.iter().filter(|(_, values)| values.len() > 1).count() < 2 {
-        // Names of MATLAB's internal objects begin so.
-        for name in root.groups().map_err(said)?.into_iter().filter(|name| !name.starts_with('#')) {
-            let group = file.group(&name).map_err(said)?;
-            columns.extend(read(group.datasets().map_err(said)?, &|name| group.dataset(name)));
+/// Puts arrays of equal length together: of the whole file if their names differ, otherwise of each group. Matrices
+/// without a vector beside them are a table each.
+fn tables(contents: Contents) -> Tables {
+    let mut left_out: Vec<String> = Vec::new();
+    let mut of_length: BTreeMap<usize, Vec<Channels>> = BTreeMap::new();
+    for (order, array) in contents.arrays.into_iter().enumerate() {
+        match length_and_width(&array.size).filter(|[length, width]| length * width == array.values.len()) {
+            Some([length, width]) => of_length.entry(length).or_default().push(Channels { order, width, array }),
+            // In a struct such numbers describe its arrays.
+            None if array.group.is_empty() => left_out.push(format!("`{}` ({})", array.name, array.in_words())),
+            None => {}
         }
     }
-    Ok(columns)
+    left_out.extend(contents.others.into_iter().map(|(name, what)| format!("`{name}` ({what})")));
+    let mut tables: Vec<(usize, Table)> = Vec::new();
+    for same in of_length.into_values() {
+        let mut names = BTreeSet::new();
+        let is_unique = same.iter().all(|one| names.insert(one.array.name.clone()));
+        let mut groups: BTreeMap<String, Vec<Channels>> = BTreeMap::new();
+        for one in same {
+            groups.entry(if is_unique { String::new() } else { one.array.group.clone() }).or_default().push(one);
+        }
+        for group in groups.into_values() {
+            if group.iter().all(|one| one.width > 1) {
+                tables.extend(group.into_iter().map(|one| (one.order, Table::of(vec![one]))));
+            } else {
+                tables.push((group[0].order, Table::of(group)));
+            }
+        }
+    }
+    tables.sort_by_key(|(order, _)| *order);
+    let mut tables: Vec<Table> = tables.into_iter().map(|(_, table)| table).collect();
+    let is_single = |table: &Table| table.columns.len() < 2;
+    left_out.extend(
+        tables
+            .iter()
+            .filter(|table| is_single(table))
+            .flat_map(|table| &table.columns)
+            .map(|(name, values)| format!("`{name}` ({} numbers)", values.len())),
+    );
+    tables.retain(|table| !is_single(table));
+    Tables { tables, left_out }
+}
+
+/// An array of one or two dimensions as columns.
+struct Channels {
+    /// Its place in the file.
+    order: usize,
+    width: usize,
+    array: Array,
+}
+
+impl Channels {
+    /// Columns, along the longer dimension.
+    fn columns(self) -> Columns {
+        let Self { width, array: Array { name, size, values, .. }, .. } = self;
+        if width == 1 {
+            return vec![(name, values)];
+        }
+        let length = values.len() / width;
+        let is_along_first = size.iter().find(|length| **length > 1) == Some(&length);
+        let column = |k: usize| -> Vec<f64> {
+            if is_along_first {
+                values[k * length..(k + 1) * length].to_vec()
+            } else {
+                values.iter().skip(k).step_by(width).copied().collect()
+            }
+        };
+        let named =
+            |k: usize| if name.is_empty() { format!("column {}", k + 1) } else { format!("{name}(:,{})", k + 1) };
+        (0..width).map(|k| (named(k), column(k))).collect()
+    }
+}
+
+impl Array {
+    /// Its size in words.
+    fn in_words(&self) -> String {
+        let size: Vec<String> = self.size.iter().map(usize::to_string).collect();
+        if self.values.len() == 1 { "a number".to_owned() } else { format!("{} numbers", size.join(" × ")) }
+    }
+}
+
+impl Table {
+    fn of(channels: Vec<Channels>) -> Self {
+        let first = &channels[0].array;
+        let name = if first.group.is_empty() { first.name.clone() } else { first.group.clone() };
+        Self { name, columns: channels.into_iter().flat_map(Channels::columns).collect() }
+    }
+
+    /// Its names and lengths.
+    pub(crate) fn extent(&self) -> Extent {
+        let columns: Vec<String> = self.columns.iter().map(|(name, _)| name.clone()).collect();
+        let rows = self.columns.first().map_or(0, |(_, values)| values.len());
+        Extent { name: self.name.clone(), rows, columns, first_line: None }
+    }
+
+    /// The lines of a text.
+    pub(crate) fn lines(self) -> Lines {
+        // A separator or a quotation mark must not occur in a name, nor a name be a number.
+        let plain = |name: &str| match name.replace(['\t', '\n', '\r', '"'], " ") {
+            number if number.trim().parse::<f64>().is_ok() => format!("column {number}"),
+            name => name,
+        };
+        let names: Vec<String> = self.columns.iter().map(|(name, _)| plain(name)).collect();
+        Lines { columns: self.columns, next: 0, line: (names.join("\t") + "\n").into_bytes(), taken: 0 }
+    }
 }
 
 /// Columns of equal length, line by line, names first.
@@ -101,14 +242,6 @@ pub(crate) struct Lines {
     next: usize,
     line: Vec<u8>,
     taken: usize,
-}
-
-impl Lines {
-    fn new(columns: Columns) -> Self {
-        // A separator must not occur in a name.
-        let names: Vec<String> = columns.iter().map(|(name, _)| name.replace(['\t', '\n', '\r'], " ")).collect();
-        Self { columns, next: 0, line: (names.join("\t") + "\n").into_bytes(), taken: 0 }
-    }
 }
 
 impl Read for Lines {

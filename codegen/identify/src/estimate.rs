@@ -38,7 +38,7 @@ pub(crate) fn of<V>(
     estimate: impl FnOnce(&Signals, &mut Findings) -> Option<V>,
 ) -> Result<Estimate<V>, Vec<Diagnostic>> {
     let signals = signals::read(input, shown_as, wanted)?;
-    let mut findings = Findings::new(shown_as);
+    let mut findings = Findings::after(shown_as, &signals.warnings);
     let value = estimate(&signals, &mut findings);
     let (value, warnings) = findings.conclude(value)?;
     Ok(Estimate { record: signals.shown_as, simulated: signals.simulated, value, warnings })

@@ -1,16 +1,131 @@
-//! Opens data files: to keep their text, or to read them line by line.
+//! Opens data files: to keep their text, or to read a table of them line by line.
+//!
+//! Text is read in sequence, whatever its size. Text in UTF-16, files packed by gzip and the binary files of
+//! [`container`](super::container) are unpacked in memory, up to [`MAX_FILE_BYTES`].
 
-use std::io::{Read, Seek};
+use std::io::{self, Cursor, Read, Seek};
 use std::path::Path;
 
-use super::columns::foreign;
-use super::container::Kind;
+use flate2::read::MultiGzDecoder;
+
+use super::columns::{self, Part, foreign, names};
+use super::container::{Kind, Table};
 use super::findings::Findings;
+use super::tables::{self, Extent};
 use specgen_language::diagnostic::{Diagnostic, codes};
 pub use specgen_language::files::MAX_BYTES as MAX_FILE_BYTES;
 use specgen_language::files::{self, ReadError};
 
-/// The text of a data file, record or table, without a byte order mark.
+/// A text, and the table of it that is read.
+pub(crate) struct Source<'a> {
+    pub(crate) lines: Box<dyn Read + 'a>,
+    pub(crate) part: Part,
+}
+
+impl<'a> Source<'a> {
+    /// A text that has one table.
+    pub(crate) fn whole(lines: impl Read + 'a) -> Self {
+        Self { lines: Box::new(lines), part: Part::WHOLE }
+    }
+
+    /// A text, and the table `series` of it, or else the longest; `None` after the problem was reported.
+    pub(crate) fn of_text(text: &'a [u8], series: Option<&str>, findings: &mut Findings) -> Option<Self> {
+        let part = part(text, series, findings)?;
+        Some(Self { lines: Box::new(text), part })
+    }
+
+    /// A table of a file in memory.
+    pub(crate) fn of_bytes(file: Vec<u8>, series: Option<&str>, findings: &mut Findings) -> Option<Source<'static>> {
+        let text = match unpacked(file, findings)? {
+            Unpacked::Text(text) => text,
+            Unpacked::Tables(kind, file) => {
+                return Some(Source::whole(table(kind, file, series, findings)?.lines()));
+            }
+        };
+        let part = part(&text[..], series, findings)?;
+        Some(Source { lines: Box::new(Cursor::new(text)), part })
+    }
+}
+
+/// The content of a file.
+enum Unpacked {
+    /// Text, unless it is something unknown.
+    Text(Vec<u8>),
+    /// A binary file of tables.
+    Tables(Kind, Vec<u8>),
+}
+
+/// The table of a text that is read.
+fn part(text: impl Read, series: Option<&str>, findings: &mut Findings) -> Option<Part> {
+    let (parts, extents): (Vec<Part>, Vec<Extent>) = columns::tables(text).into_iter().unzip();
+    // What has no table is refused when it is read.
+    if parts.len() < 2 && series.is_none() {
+        return Some(parts.first().copied().unwrap_or(Part::WHOLE));
+    }
+    tables::choose(&extents, is_record, &[], series, findings).map(|chosen| parts[chosen])
+}
+
+/// The table of a binary file that is read.
+fn table(kind: Kind, file: Vec<u8>, series: Option<&str>, findings: &mut Findings) -> Option<Table> {
+    let found = kind.tables(file).map_err(|why| {
+        let message = format!("is {} and {why}", kind.name());
+        findings.add(codes::RECORD_NOT_TEXT, None, message, "save time, drive and displacement as arrays of numbers");
+    });
+    let mut found = found.ok()?;
+    let extents: Vec<Extent> = found.tables.iter().map(Table::extent).collect();
+    let chosen = tables::choose(&extents, is_record, &found.left_out, series, findings)?;
+    Some(found.tables.swap_remove(chosen))
+}
+
+/// Whether a table has names of a record.
+fn is_record(table: &Extent) -> bool {
+    table.columns.iter().filter(|name| names::is_known(name)).count() > 1
+}
+
+/// Whether a file that begins so is unpacked in memory.
+fn is_packed(first: &[u8]) -> bool {
+    Kind::of(first).is_some() || matches!(first, [0x1f, 0x8b, ..] | [0xff, 0xfe, ..] | [0xfe, 0xff, ..])
+}
+
+/// Unpacks gzip, then UTF-16; `None` after the problem was reported.
+fn unpacked(mut file: Vec<u8>, findings: &mut Findings) -> Option<Unpacked> {
+    if file.starts_with(&[0x1f, 0x8b]) {
+        let mut content = Vec::new();
+        let packed = MultiGzDecoder::new(&file[..]).take(MAX_FILE_BYTES + 1).read_to_end(&mut content);
+        if let Err(error) = packed {
+            let message = format!("is packed by gzip and cannot be unpacked: {error}");
+            return findings.refuse(codes::RECORD_NOT_TEXT, None, message, "copy the file again, or pack it again");
+        }
+        if content.len() as u64 > MAX_FILE_BYTES {
+            return too_large("unpacked, is", findings);
+        }
+        file = content;
+    }
+    if let Some(kind) = Kind::of(&file) {
+        return Some(Unpacked::Tables(kind, file));
+    }
+    if let [a @ (0xff | 0xfe), b @ (0xff | 0xfe), rest @ ..] = &file[..]
+        && a != b
+    {
+        let (pairs, odd) = rest.as_chunks::<2>();
+        if !odd.is_empty() {
+            let message = "is text in UTF-16 that is cut off: it has an odd number of bytes".to_owned();
+            return findings.refuse(codes::RECORD_NOT_TEXT, None, message, "copy the file again, or export it again");
+        }
+        let unit = |pair: &[u8; 2]| if *a == 0xff { u16::from_le_bytes(*pair) } else { u16::from_be_bytes(*pair) };
+        let text = char::decode_utf16(pairs.iter().map(unit)).map(|c| c.unwrap_or(char::REPLACEMENT_CHARACTER));
+        return Some(Unpacked::Text(text.collect::<String>().into_bytes()));
+    }
+    Some(Unpacked::Text(file))
+}
+
+fn too_large<T>(what: &str, findings: &mut Findings) -> Option<T> {
+    let message = format!("{what} larger than {} MiB", MAX_FILE_BYTES >> 20);
+    let help = "save only time, drive and displacement, or every n-th sample; plain text may have any size";
+    findings.refuse(codes::RECORD_TOO_LARGE, None, message, help)
+}
+
+/// The text of a data file, record or table, without a byte order mark. A binary file of tables gives the text of one.
 ///
 /// # Errors
 /// A finding if it is not a regular file, cannot be read, is larger than [`MAX_FILE_BYTES`], or is not UTF-8.
@@ -21,7 +136,6 @@ pub fn read_file(path: &Path, shown_as: &str) -> Result<String, Vec<Diagnostic>>
 
 /// The text of the file without a byte order mark, or `None` after the reason was reported.
 fn read_text(path: &Path, findings: &mut Findings) -> Option<String> {
-    findings.lies_at(path);
     let bytes = match files::open_file(path).and_then(|file| files::content(file, MAX_FILE_BYTES)) {
         Ok(bytes) => bytes,
         Err(ReadError::Large(limit)) => {
@@ -32,6 +146,19 @@ fn read_text(path: &Path, findings: &mut Findings) -> Option<String> {
         Err(unread) => {
             unreadable(&unread, findings);
             return None;
+        }
+    };
+    let bytes = match unpacked(bytes, findings)? {
+        Unpacked::Text(text) => text,
+        Unpacked::Tables(kind, file) => {
+            let mut text = Vec::new();
+            let lines = table(kind, file, None, findings)?.lines();
+            // Reading from memory cannot fail.
+            let _ = lines.take(MAX_FILE_BYTES + 1).read_to_end(&mut text);
+            if text.len() as u64 > MAX_FILE_BYTES {
+                return too_large("as text, is", findings);
+            }
+            text
         }
     };
     let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&bytes);
@@ -48,23 +175,28 @@ fn read_text(path: &Path, findings: &mut Findings) -> Option<String> {
     Some(String::from_utf8_lossy(bytes).into_owned())
 }
 
-/// A data file to read lines from, or `None` after the reason was reported. A file of MATLAB, HDF5 or TDMS has the size
-/// limit of a text in memory; any other is read in sequence.
-pub(crate) fn open_file(path: &Path, findings: &mut Findings) -> Option<Box<dyn Read>> {
-    findings.lies_at(path);
-    let (mut file, mut first) =
-        (files::open_file(path).map_err(|unread| unreadable(&unread, findings)).ok()?, Vec::new());
-    let begun = (&mut file).take(Kind::TELLING as u64).read_to_end(&mut first).and_then(|_| file.rewind());
-    let bytes = begun.and_then(|()| file.metadata()).map_err(|error| unreadable(&error.into(), findings)).ok()?.len();
-    let Some(kind) = Kind::of(&first) else { return Some(Box::new(file)) };
-    if bytes > MAX_FILE_BYTES {
-        foreign::report_as(&first, &format!("and larger than {} MiB", MAX_FILE_BYTES >> 20), findings);
-        return None;
+/// The table `series` of a data file, or else the longest; `None` after the reason was reported.
+pub(crate) fn open_file(path: &Path, series: Option<&str>, findings: &mut Findings) -> Option<Source<'static>> {
+    let begin = || -> Result<_, ReadError> {
+        let (mut file, mut first) = (files::open_file(path)?, Vec::new());
+        (&mut file).take(Kind::TELLING as u64).read_to_end(&mut first)?;
+        file.rewind()?;
+        Ok((file, first))
+    };
+    let (mut file, first) = begin().map_err(|unread| unreadable(&unread, findings)).ok()?;
+    if is_packed(&first) {
+        return match files::content(file, MAX_FILE_BYTES) {
+            Ok(bytes) => Source::of_bytes(bytes, series, findings),
+            Err(ReadError::Large(_)) => too_large("is no plain text, and is", findings),
+            Err(unread) => {
+                unreadable(&unread, findings);
+                None
+            }
+        };
     }
-    kind.open(file, path)
-        .map(|lines| Box::new(lines) as Box<dyn Read>)
-        .map_err(|why| foreign::report_as(&first, &format!("and {why}"), findings))
-        .ok()
+    let part = part(&file, series, findings)?;
+    file.rewind().map_err(|error: io::Error| unreadable(&error.into(), findings)).ok()?;
+    Some(Source { lines: Box::new(file), part })
 }
 
 fn unreadable(unread: &ReadError, findings: &mut Findings) {

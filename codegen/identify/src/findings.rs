@@ -1,7 +1,6 @@
 //! Collects findings about one data file, so that one run reports all of them without flooding the user.
 
 use std::collections::BTreeMap;
-use std::path::Path;
 
 use specgen_language::diagnostic::{Code, Diagnostic, Severity};
 
@@ -12,8 +11,6 @@ const SHOWN_PER_CODE: usize = 5;
 #[derive(Debug)]
 pub(crate) struct Findings {
     path: String,
-    /// Path for a command line.
-    place: String,
     found: Vec<Diagnostic>,
     count: BTreeMap<&'static str, (Code, usize)>,
 }
@@ -21,7 +18,7 @@ pub(crate) struct Findings {
 impl Findings {
     /// An empty collection for the file that the user named `path`.
     pub(crate) fn new(path: &str) -> Self {
-        Self { path: path.to_owned(), place: path.to_owned(), found: Vec::new(), count: BTreeMap::new() }
+        Self { path: path.to_owned(), found: Vec::new(), count: BTreeMap::new() }
     }
 
     /// The same, after the warnings of an earlier step.
@@ -32,16 +29,6 @@ impl Findings {
     /// The file as the user named it.
     pub(crate) fn path(&self) -> &str {
         &self.path
-    }
-
-    /// Path at which the file is opened: a file in a spec is shown relative to the spec, but lies beside it.
-    pub(crate) fn lies_at(&mut self, path: &Path) {
-        self.place = path.strip_prefix(".").unwrap_or(path).display().to_string();
-    }
-
-    /// Path of the file for a command line.
-    pub(crate) fn place(&self) -> &str {
-        &self.place
     }
 
     /// Adds a finding about `line`, or about the whole file, with the severity of its code.

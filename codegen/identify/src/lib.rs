@@ -12,7 +12,7 @@
 //!
 //! | module | what |
 //! |---|---|
-//! | `columns`, `container`, `record` | the reader of CSV, MATLAB, HDF5 and TDMS files; checked samples |
+//! | `columns`, `container`, `tables`, `record` | the reader of text, MATLAB, HDF5, TDMS and NumPy files; checked samples |
 //! | `joined` | several records of one leg as one |
 //! | `normal`, `selection`, `residual` | normal equations, choice of the grid, causes of the residual |
 //! | [`leg_model`] | families of leg models fitted to a record, and the choice among them |
@@ -63,7 +63,9 @@ mod staircase;
 pub mod states;
 mod statistics;
 pub mod stiffness;
+mod stretches;
 mod sweep;
+mod tables;
 mod turns;
 pub mod waveform;
 

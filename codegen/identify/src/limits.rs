@@ -3,14 +3,13 @@
 
 use super::columns::LineNumbers;
 use super::findings::Findings;
-use super::statistics::{extent, median, noise_floor};
+use super::statistics::{LAG, extent, median, noise_floor, step};
 use specgen_language::diagnostic::codes;
 
 /// Travel of the drive that is evaluated, as a fraction of its range, and least number of samples in it.
 const TRAVEL: f64 = 0.1;
 const SAMPLES: usize = 10;
-/// Samples that are skipped after a reversal, and least time, s: a dead time holds the displacement there.
-const SKIPPED: usize = 16;
+/// Least time that is skipped after a reversal, s, but at least [`LAG`] samples: a dead time holds the displacement there.
 const SKIPPED_TIME: f64 = 1.6e-3;
 /// Fraction of the mean gain below which a piezo does not move; after a reversal it moves by about half.
 const HARDLY: f64 = 0.08;
@@ -38,17 +37,23 @@ pub(crate) fn check(lines: &LineNumbers, time: &[f64], drive: &[f64], displaceme
         .collect();
     for (first, end, rising) in runs(drive) {
         let sign = if rising { 1.0 } else { -1.0 };
-        let after = time[first..end].iter().take_while(|t| **t - time[first] < SKIPPED_TIME).count();
-        let mut at = first + if after > SKIPPED { after } else { SKIPPED };
+        let after = |at: usize| {
+            let count = time[at..].iter().take_while(|t| **t - time[at] < SKIPPED_TIME).count();
+            at + if count > LAG { count } else { LAG }
+        };
+        let mut at = after(first);
         let mut flat: Option<(usize, usize)> = None;
         while at < end {
             let Some(to) = (at..end).find(|&k| k >= at + SAMPLES && (drive[k] - drive[at]).abs() >= travel) else {
                 break;
             };
-            let moved = sign * (middle[to] - middle[at]);
+            // After a step, the displacement is given time to follow, whatever the drive does then.
+            let seen = if step(&drive[at..=to]).is_some() { after(to) } else { to };
+            let seen = if seen < time.len() { seen } else { time.len() - 1 };
+            let moved = sign * (middle[seen] - middle[at]);
             let little = HARDLY * gain * (drive[to] - drive[at]).abs();
             // A ringing displacement returns to its start, but has moved in the meantime.
-            let (lowest, highest) = extent(&middle[at..=to]);
+            let (lowest, highest) = extent(&middle[at..=seen]);
             let hardly = moved < little && highest - lowest < little + NOISE_EXTENT * noise;
             flat = match (flat, hardly) {
                 (Some((from, _)), true) => Some((from, to)),

@@ -1,6 +1,9 @@
 //! The user's description of the columns of bench files.
 
-use super::columns::names::{QUANTITIES, Quantity};
+mod scale;
+
+use super::columns::names::{Conversion, QUANTITIES, Quantity};
+use scale::Scaled;
 
 /// How to read records whose names are not standard. By default, by their names.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -8,30 +11,49 @@ pub struct Reading {
     columns: Vec<ColumnChoice>,
     /// Samples per second, Hz; time is computed from it.
     rate: Option<f64>,
+    /// Name or number of the table in a file that has several.
+    series: Option<String>,
 }
 
 /// A column that the user names.
 #[derive(Debug, Clone, PartialEq)]
-struct ColumnChoice {
+pub(crate) struct ColumnChoice {
+    /// `NAME=COLUMN`.
+    text: String,
     /// The quantity's name in this project, or `sample`.
     quantity: &'static str,
-    /// Number of the column's units in one of the quantity's.
-    per: f64,
-    /// Its name, or its number from 1.
-    column: String,
+    /// Its name, or its number from 1, and what follows it: a name may look like a scale.
+    pub(crate) column: String,
+    /// Its unit; none if only the scale has one.
+    pub(crate) conversion: Option<Conversion>,
+    /// What `column` means if no column has that name.
+    pub(crate) scaled: Option<Scaled>,
 }
 
 /// Quantity of a column with sample numbers.
 const SAMPLE: &str = "sample";
 
 impl Reading {
-    /// From `NAME=COLUMN` each, such as `drive_mV=Voltage` or `time_s=1`: a name with its unit, and the header or the
-    /// number (from 1) of its column; and samples per second, Hz.
+    /// From lists of `NAME=COLUMN`, such as `drive_mV=Voltage,time_s=1`: a name with its unit, and the header or the
+    /// number (from 1) of its column, which may be scaled, as in `displacement=CH2*5 um/V+0.3 um`; and samples per
+    /// second, Hz.
     ///
     /// # Errors
     /// The expected form, for the first that does not have it.
     pub fn new(columns: &[String], rate: Option<f64>) -> Result<Self, String> {
-        Ok(Self { columns: columns.iter().map(|text| column_choice(text)).collect::<Result<_, _>>()?, rate })
+        let entries = columns.iter().flat_map(|list| entries(list));
+        Ok(Self { columns: entries.map(column_choice).collect::<Result<_, _>>()?, rate, series: None })
+    }
+
+    /// The same, of the table with this name or number (from 1) in a file that has several.
+    #[must_use]
+    pub fn of_series(self, series: Option<String>) -> Self {
+        Self { series, ..self }
+    }
+
+    /// Name or number of the table.
+    pub(crate) fn series(&self) -> Option<&str> {
+        self.series.as_deref()
     }
 
     /// Samples per second, Hz.
@@ -39,17 +61,19 @@ impl Reading {
         self.rate
     }
 
-    /// The name or number of the column that the user names for a quantity, with its unit.
-    pub(crate) fn column(&self, quantity: &str) -> Option<(&str, f64)> {
-        self.columns
-            .iter()
-            .find(|chosen| chosen.quantity == quantity)
-            .map(|chosen| (chosen.column.as_str(), chosen.per))
+    /// The column that the user names for a quantity.
+    pub(crate) fn column(&self, quantity: &str) -> Option<&ColumnChoice> {
+        self.columns.iter().find(|chosen| chosen.quantity == quantity)
+    }
+
+    /// The entries, as the user gave them.
+    pub(crate) fn given(&self) -> impl Iterator<Item = &str> {
+        self.columns.iter().map(|chosen| chosen.text.as_str())
     }
 
     /// The column with sample numbers.
-    pub(crate) fn sample_column(&self) -> Option<&str> {
-        self.column(SAMPLE).map(|(column, _)| column)
+    pub(crate) fn sample_column(&self) -> Option<&ColumnChoice> {
+        self.column(SAMPLE)
     }
 
     /// Quantities with a column from the user, without those `wanted`.
@@ -58,32 +82,64 @@ impl Reading {
     }
 }
 
-fn column_choice(text: &str) -> Result<ColumnChoice, String> {
+/// The entries of a list. A comma within a header separates nothing: an entry begins with a name and `=`.
+fn entries(list: &str) -> Vec<String> {
+    let begins = |piece: &str| {
+        let is_letter = |c: char| c.is_ascii_alphanumeric() || c == '_';
+        piece.split_once('=').is_some_and(|(name, _)| !name.trim().is_empty() && name.trim().chars().all(is_letter))
+    };
+    let mut entries: Vec<String> = Vec::new();
+    for piece in list.split(',') {
+        match entries.last_mut() {
+            Some(last) if !begins(piece) => {
+                last.push(',');
+                last.push_str(piece);
+            }
+            _ => entries.push(piece.to_owned()),
+        }
+    }
+    entries
+}
+
+fn column_choice(text: String) -> Result<ColumnChoice, String> {
     let expected = || format!("expected a name with its unit and a column, such as drive_V=2, found `{text}`");
     let (name, column) = text.split_once('=').ok_or_else(expected)?;
-    let (name, column) = (name.trim(), column.trim().to_owned());
+    let (name, column) = (name.trim().to_owned(), column.trim().to_owned());
     if column.is_empty() {
         return Err(expected());
     }
     if name == SAMPLE {
-        return Ok(ColumnChoice { quantity: SAMPLE, per: 1.0, column });
+        return Ok(ColumnChoice {
+            text,
+            quantity: SAMPLE,
+            column,
+            conversion: Some(Conversion::unit(1.0)),
+            scaled: None,
+        });
     }
-    let found = QUANTITIES.iter().find_map(|quantity: &Quantity| quantity.per_of(name).map(|per| (quantity.name, per)));
-    match found {
-        Some((quantity, per)) => Ok(ColumnChoice { quantity, per, column }),
-        None => {
-            let plain = name.split('_').next().unwrap_or(name);
-            let near = QUANTITIES.iter().find(|quantity| quantity.plain().eq_ignore_ascii_case(plain));
-            let known = near.map_or_else(
-                || {
-                    QUANTITIES.iter().map(|quantity| format!("`{}`", quantity.name)).collect::<Vec<_>>().join(", ")
-                        + ", `sample`"
-                },
-                Quantity::all_names,
-            );
-            Err(format!("`{name}` is not a column name; expected one of {known}"))
-        }
+    let found = QUANTITIES.iter().find_map(|quantity| match quantity.per_of(&name) {
+        Some(per) => Some((quantity, Some(per))),
+        None => (name == quantity.plain()).then_some((quantity, None)),
+    });
+    let Some((quantity, per)) = found else { return Err(unknown(&name)) };
+    let scaled = match scale::parse(&column, quantity, per) {
+        // With a unit in the name, what looks like a scale may be a header.
+        Err(_) if per.is_some() => None,
+        scaled => scaled?,
+    };
+    if per.is_none() && scaled.is_none() {
+        let unit = quantity.unit();
+        return Err(format!("`{name}` has no unit: {}, or `{name}={column}*5 {unit}/V`", quantity.all_names()));
     }
+    Ok(ColumnChoice { text, quantity: quantity.name, column, conversion: per.map(Conversion::unit), scaled })
+}
+
+fn unknown(name: &str) -> String {
+    let plain = name.split('_').next().unwrap_or(name);
+    let near = QUANTITIES.iter().find(|quantity| quantity.plain().eq_ignore_ascii_case(plain));
+    let all = || QUANTITIES.iter().map(|quantity| format!("`{}`", quantity.name)).collect::<Vec<_>>().join(", ");
+    let known = near.map_or_else(|| all() + ", `sample`", Quantity::all_names);
+    format!("`{name}` is not a column name; expected one of {known}")
 }
 
 #[cfg(test)]
@@ -92,15 +148,21 @@ mod tests {
 
     #[test]
     fn columns_are_named_with_their_units() {
-        let reading = Reading::new(&["drive_mV=Voltage 1".to_owned(), "sample=3".to_owned()], Some(1e4)).unwrap();
-        assert_eq!(reading.column("drive_V"), Some(("Voltage 1", 1e3)));
-        assert_eq!((reading.sample_column(), reading.rate()), (Some("3"), Some(1e4)));
-        assert_eq!(reading.unknown(&["time_s"]).collect::<Vec<_>>(), ["drive_V"]);
+        let list = "drive_mV=Voltage 1,sample=3,displacement_um=Ch2,um".to_owned();
+        let reading = Reading::new(&[list], Some(1e4)).unwrap();
+        let drive = reading.column("drive_V").unwrap();
+        assert_eq!((drive.column.as_str(), drive.conversion), ("Voltage 1", Some(Conversion::unit(1e3))));
+        assert_eq!(reading.column("displacement_um").unwrap().column, "Ch2,um");
+        assert_eq!((reading.sample_column().unwrap().column.as_str(), reading.rate()), ("3", Some(1e4)));
+        assert_eq!(reading.unknown(&["time_s", "drive_V"]).collect::<Vec<_>>(), ["displacement_um"]);
         for (text, expected) in [
             ("drive_V", "such as drive_V=2"),
             ("drive_V=", "such as drive_V=2"),
             ("drive=2", "`drive_V`, `drive_mV`"),
             ("speed_V=2", "`time_s`, `drive_V`"),
+            ("time_s=1,speed_V=2", "`time_s`, `drive_V`"),
+            ("displacement=CH2*5 V/um", "a unit of `displacement`"),
+            ("displacement=CH2*x", "a factor"),
         ] {
             let found = Reading::new(&[text.to_owned()], None).unwrap_err();
             assert!(found.contains(expected), "{found}");

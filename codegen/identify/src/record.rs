@@ -2,13 +2,12 @@
 //!
 //! One run reports every problem of the file. [`super::coverage`] later checks the drive range.
 
-use std::io::Read;
 use std::ops::Range;
 use std::path::Path;
 
 use super::columns::{LineNumbers, RECORD};
 use super::distrust;
-use super::file::open_file;
+use super::file::{Source, open_file};
 use super::findings::Findings;
 use super::reading::Reading;
 use super::signals::{self, ColumnSpec, MONITOR, Signals, optional, required};
@@ -103,7 +102,7 @@ impl Record {
 /// All findings of the file, including warnings, if at least one refuses it.
 pub fn read_record(path: &Path, shown_as: &str, reading: &Reading) -> Result<Record, Vec<Diagnostic>> {
     let mut findings = Findings::new(shown_as);
-    match open_file(path, &mut findings) {
+    match open_file(path, reading.series(), &mut findings) {
         Some(file) => of_source(file, reading, findings),
         None => Err(findings.into_diagnostics()),
     }
@@ -114,7 +113,11 @@ pub fn read_record(path: &Path, shown_as: &str, reading: &Reading) -> Result<Rec
 /// # Errors
 /// As [`read_record`].
 pub fn parse_record(text: &str, shown_as: &str) -> Result<Record, Vec<Diagnostic>> {
-    of_source(text.as_bytes(), &Reading::default(), Findings::new(shown_as))
+    let mut findings = Findings::new(shown_as);
+    match Source::of_text(text.as_bytes(), None, &mut findings) {
+        Some(text) => of_source(text, &Reading::default(), findings),
+        None => Err(findings.into_diagnostics()),
+    }
 }
 
 /// Columns of a record; the displacement is optional in a record for prediction.
@@ -133,7 +136,7 @@ pub(crate) fn quantities(signals: &mut Signals) -> (Vec<f64>, Vec<f64>, bool, Op
     (time.unwrap_or_default(), command.or(monitor).unwrap_or_default(), monitored, displacement)
 }
 
-fn of_source(source: impl Read, reading: &Reading, mut findings: Findings) -> Result<Record, Vec<Diagnostic>> {
+fn of_source(source: Source, reading: &Reading, mut findings: Findings) -> Result<Record, Vec<Diagnostic>> {
     let Some(mut signals) = signals::columns_of(source, &wanted(true), reading, &mut findings) else {
         return Err(findings.into_diagnostics());
     };
@@ -195,3 +198,9 @@ pub(crate) fn later(time: &[f64], values: &[f64], delay: f64) -> Vec<f64> {
 #[cfg(test)]
 #[path = "record/tests/files.rs"]
 mod files;
+#[cfg(test)]
+#[path = "record/tests/labs.rs"]
+mod labs;
+#[cfg(test)]
+#[path = "record/tests/mat_file.rs"]
+mod mat_file;

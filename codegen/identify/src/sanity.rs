@@ -5,12 +5,11 @@ use super::findings::Findings;
 use super::least_squares::dot;
 use super::limits;
 use super::statistics::{Standstill, centred, extent, median, micrometres, standstills};
+use super::stretches::GAP;
 use specgen_language::diagnostic::codes;
 
 /// Least number of samples of a record.
 pub const MIN_SAMPLES: usize = 100;
-/// A sampling interval this many times the median is a gap: a reversal may be hidden in it.
-const GAP: f64 = 10.0;
 /// A longer record of reversal curves, s, has another unit, or drifts.
 const LONGEST: f64 = 3600.0;
 /// White noise of a command, relative to its range, is below this (rounding to five digits); that of a gauge is above.

@@ -2,15 +2,15 @@
 
 mod places;
 
-use std::io::Read;
 use std::path::Path;
 
-use super::columns::{self, Column, LineNumbers, RECORD, Samples};
-use super::file::open_file;
+use super::columns::{self, Column, Head, LineNumbers, RECORD, Samples, names};
+use super::file::{Source, open_file};
 use super::findings::Findings;
 use super::reading::Reading;
 use super::sanity;
 use super::statistics::{self, Standstill, standstills};
+use super::stretches;
 use specgen_language::diagnostic::{Diagnostic, codes};
 
 /// A column that a record may have.
@@ -41,6 +41,8 @@ pub(crate) struct Signals {
     pub(crate) columns: Vec<Option<Vec<f64>>>,
     /// Whether a comment marks the file as simulated.
     pub(crate) simulated: bool,
+    /// Findings that refuse nothing.
+    pub(crate) warnings: Vec<Diagnostic>,
 }
 
 pub(crate) use places::MONITOR;
@@ -64,15 +66,15 @@ pub enum Input<'a> {
 pub(crate) fn read(input: Input, shown_as: &str, wanted: &[ColumnSpec]) -> Result<Signals, Vec<Diagnostic>> {
     let mut findings = Findings::new(shown_as);
     let signals = match input {
-        Input::File(path, reading) => {
-            open_file(path, &mut findings).and_then(|file| checked(file, wanted, reading, &mut findings))
-        }
-        Input::Text(text) => checked(text.as_bytes(), wanted, &Reading::default(), &mut findings),
+        Input::File(path, reading) => open_file(path, reading.series(), &mut findings)
+            .and_then(|file| checked(file, wanted, reading, &mut findings)),
+        Input::Text(text) => Source::of_text(text.as_bytes(), None, &mut findings)
+            .and_then(|text| checked(text, wanted, &Reading::default(), &mut findings)),
     };
-    findings.conclude(signals).map(|(signals, _)| signals)
+    findings.conclude(signals).map(|(signals, warnings)| Signals { warnings, ..signals })
 }
 
-fn checked(source: impl Read, wanted: &[ColumnSpec], reading: &Reading, findings: &mut Findings) -> Option<Signals> {
+fn checked(source: Source, wanted: &[ColumnSpec], reading: &Reading, findings: &mut Findings) -> Option<Signals> {
     let signals = columns_of(source, wanted, reading, findings)?;
     let lines = &signals.lines;
     if lines.len() < MIN_SAMPLES {
@@ -86,12 +88,20 @@ fn checked(source: impl Read, wanted: &[ColumnSpec], reading: &Reading, findings
 
 /// The `wanted` columns without any check of their values; `None` after every problem of the header was reported.
 pub(crate) fn columns_of(
-    source: impl Read,
+    Source { lines, part }: Source,
     wanted: &[ColumnSpec],
     reading: &Reading,
     findings: &mut Findings,
 ) -> Option<Signals> {
-    let (header, lines) = columns::open(source, &RECORD, findings)?;
+    let (header, lines) = columns::open_part(lines, part, &RECORD, findings)?;
+    if wanted[0].name == TIME && part.curves >= CURVES && !has_time(&header, reading) {
+        let message = format!(
+            "has {} curves between blank lines, each in one direction and without times, as magnetometers record FORC: the way back to each reversal was not recorded, so the drive between the curves is not known",
+            part.curves
+        );
+        let help = "record time, drive and displacement without a break, on the ways back as well";
+        return findings.refuse(codes::RECORD_GAP, None, message, help);
+    }
     let places = places::find(&header, wanted, reading, findings)?;
     let there: Vec<Column> = places.columns.iter().flatten().copied().collect();
     let Samples { lines, columns: values, simulated } = lines.read(&there, findings);
@@ -106,7 +116,23 @@ pub(crate) fn columns_of(
             None => *time = Some((0..lines.len()).map(|k| k as f64 * interval).collect()),
         }
     }
-    Some(Signals { shown_as: findings.path().to_owned(), lines, columns, simulated })
+    let mut signals = Signals { shown_as: findings.path().to_owned(), lines, columns, simulated, warnings: Vec::new() };
+    if let (TIME, Some(Some(time)), false) = (wanted[0].name, signals.columns.first(), findings.any_error())
+        && let Some(stretch) = stretches::longest(time, findings)
+    {
+        signals.lines = signals.lines.part(stretch.clone());
+        signals.columns.iter_mut().flatten().for_each(|column| *column = column[stretch.clone()].to_vec());
+    }
+    Some(signals)
+}
+
+/// Curves in one direction from which a file is a magnetometer's.
+const CURVES: usize = 3;
+
+/// Whether a file has a column of times.
+fn has_time(header: &Head, reading: &Reading) -> bool {
+    let is_time = |name: &String| names::quantity(TIME).is_some_and(|time| time.fits(name).is_some());
+    reading.column(TIME).is_some() || header.names.iter().any(is_time)
 }
 
 impl Signals {

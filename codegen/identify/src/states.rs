@@ -1,5 +1,7 @@
-//! Reads states of a platform: a CSV file of eighteen columns with a line of names, in SI units.
+//! Reads states of a platform: a CSV file of eighteen columns with a line of names, in SI units unless a name has another
+//! unit in brackets, such as `x (um)`, `vz [um/s]` or `ax [um/s^2]`.
 
+use crate::columns::names::{COORDINATES, Conversion, unit_in_brackets};
 use crate::columns::{self, Column, Format, RECORD};
 use crate::findings::Findings;
 use specgen_language::diagnostic::{Diagnostic, codes};
@@ -9,8 +11,7 @@ pub type State = [[f64; 6]; 3];
 
 const FORMAT: Format = Format { preamble: false, ..RECORD };
 const COLUMNS: usize = 18;
-const HELP: &str =
-    "write 18 names, of pose, rate and acceleration in x, y, z, θx, θy, θz, such as `x,y,z,rx,ry,rz,vx,…`";
+const HELP: &str = "write 18 names, of pose, rate and acceleration in x, y, z, θx, θy, θz, such as `x,y,z,rx,ry,rz,vx,…` or `x (um),…`";
 
 /// States from the text of their file, in order.
 ///
@@ -19,13 +20,18 @@ const HELP: &str =
 pub fn parse(text: &str, shown_as: &str) -> Result<Vec<State>, Vec<Diagnostic>> {
     let mut findings = Findings::new(shown_as);
     let states = columns::open(text.as_bytes(), &FORMAT, &mut findings).and_then(|(header, lines)| {
-        let names: Vec<Column> = header.names.iter().enumerate().map(|(at, name)| Column::plain(at, name)).collect();
+        let columns = header.names.iter().enumerate();
+        let columns = columns.map(|(at, name)| Some(Column { at, name, conversion: conversion(at, name)? }));
+        let names: Vec<Option<Column>> = columns.collect();
         let is_number = |name: &&String| name.parse::<f64>().is_ok();
         let wrong = if let Some(number) = header.names.iter().find(is_number) {
             format!("the first line names the columns, but `{number}` is a number")
         } else if names.len() != COLUMNS {
             format!("there are {} columns, expected {COLUMNS}", names.len())
+        } else if let Some(unknown) = names.iter().position(Option::is_none) {
+            format!("the unit of `{}` is not known in column {}", header.names[unknown], unknown + 1)
         } else {
+            let names: Vec<Column> = names.into_iter().flatten().collect();
             let columns = lines.read(&names, &mut findings).columns;
             let count = columns.first().map_or(0, Vec::len);
             let state = |row: usize| -> State {
@@ -36,6 +42,20 @@ pub fn parse(text: &str, shown_as: &str) -> Result<Vec<State>, Vec<Diagnostic>> 
         findings.refuse(codes::RECORD_HEADER, Some(header.line), wrong, HELP)
     });
     findings.conclude(states).map(|(states, _)| states)
+}
+
+/// From the unit in brackets of column `at`, from 0, to SI units: those without brackets have them. None if the unit is
+/// not one of the coordinate, per s for a rate and per s² for an acceleration.
+fn conversion(at: usize, name: &str) -> Option<Conversion> {
+    let Some(unit) = unit_in_brackets(name) else { return Some(Conversion::unit(1.0)) };
+    let per_time: &[&str] = match at / 6 {
+        0 => &[""],
+        1 => &["/s"],
+        _ => &["/s^2", "/s2", "/s²", "/s/s"],
+    };
+    let unit = per_time.iter().find_map(|ending| unit.strip_suffix(ending))?;
+    // Coordinates are in µm and µrad.
+    Some(Conversion::unit(1e6 * COORDINATES[at % 6].per(unit)?))
 }
 
 #[cfg(test)]
@@ -54,6 +74,30 @@ mod tests {
         assert_eq!((states.len(), states[0][0][0], states[0][1][0], states[0][2][5]), (1, 0.0, 6.0, 17.0));
         let found = parse(&format!("{names}\n{}\n", row("NaN")), "s.csv").unwrap_err();
         assert!(found[0].message.contains("`c0` is `NaN`"), "{found:?}");
+    }
+
+    #[test]
+    fn units_in_brackets_are_converted() {
+        let name = |k: usize| match k {
+            0 => "X (um)".to_owned(),
+            5 => "Rz [deg]".to_owned(),
+            6 => "vx [mm/s]".to_owned(),
+            14 => "az (µm/s²)".to_owned(),
+            _ => format!("c{k}"),
+        };
+        let names = (0..18).map(name).collect::<Vec<_>>().join(",");
+        let [pose, rate, acceleration] = parse(&format!("{names}\n{}\n", ["180"; 18].join(",")), "s.csv").unwrap()[0];
+        for (value, expected) in [
+            (pose[0], 180e-6),
+            (pose[1], 180.0),
+            (pose[5], core::f64::consts::PI),
+            (rate[0], 0.18),
+            (acceleration[2], 180e-6),
+        ] {
+            assert!((value / expected - 1.0).abs() < 1e-12, "{value} {expected}");
+        }
+        let found = parse(&format!("{}\n{}\n", names.replace("mm/s", "mm"), row("0")), "s.csv").unwrap_err();
+        assert!(found[0].message.contains("`vx [mm]`"), "{found:?}");
     }
 
     #[test]

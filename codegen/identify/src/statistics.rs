@@ -78,8 +78,17 @@ pub(crate) struct Standstill {
     pub(crate) input: [f64; 2],
 }
 
+/// Samples after a step of a drive in which a gauge may still rest: it lags.
+pub(crate) const LAG: usize = 16;
+
+/// The sample after the step that makes most of the travel of `values`, if one does.
+pub(crate) fn step(values: &[f64]) -> Option<usize> {
+    let (low, high) = extent(values);
+    (1..values.len()).find(|&k| (values[k] - values[k - 1]).abs() > 0.5 * (high - low))
+}
+
 /// Stretches of at least `least` samples over which `output` is exactly constant while `input` travels [`TRAVEL`] of its
-/// range: a sensor that is stuck or at its limit.
+/// range: a sensor that is stuck or at its limit. A rest that ends within [`LAG`] of a step of the input is none.
 pub(crate) fn standstills(input: &[f64], output: &[f64], least: usize) -> Vec<Standstill> {
     let (low, high) = extent(input);
     let mut found = Vec::new();
@@ -87,7 +96,8 @@ pub(crate) fn standstills(input: &[f64], output: &[f64], least: usize) -> Vec<St
     while first < output.len() {
         let run = output[first..].iter().take_while(|v| **v == output[first]).count();
         let (from, to) = extent(&input[first..first + run]);
-        if run >= least && to - from > TRAVEL * (high - low) {
+        let rests = || step(&input[first..first + run]).is_some_and(|step| run - step <= LAG);
+        if run >= least && to - from > TRAVEL * (high - low) && !rests() {
             found.push(Standstill { first, run, input: [from, to] });
         }
         first += run;
@@ -157,6 +167,17 @@ pub fn median_slope(points: &[(f64, f64)]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_gauge_that_lags_a_step_is_not_stuck() {
+        let drive = |k: usize| if k < 30 { 0.0 } else { 25.0 * (1 + (k - 30) / 40) as f64 };
+        let input: Vec<f64> = (0..200).map(drive).collect();
+        let late = |lag: usize| -> Vec<f64> { (0..200).map(|k: usize| drive(k.saturating_sub(lag))).collect() };
+        assert!(standstills(&input, &late(1), 1).is_empty() && standstills(&input, &late(LAG), 1).is_empty());
+        assert_eq!(standstills(&input, &late(LAG + 1), 1).len(), 4);
+        let ramp: Vec<f64> = (0..200).map(f64::from).collect();
+        assert_eq!(standstills(&ramp, &[1.0; 200], 1).len(), 1);
+    }
 
     #[test]
     fn micrometres_are_those_of_the_record() {

@@ -1,23 +1,19 @@
-//! Reads a table of poses: a CSV file whose columns name axis and unit, such as `x_um` and `theta_z_urad`.
+//! Reads a table of poses: a CSV file whose columns name axis and unit, such as `x_um`, `theta_z_urad` or `Rz [deg]`.
 //!
-//! Rows have the fixed period of the spec. A column `time_s` (or `time_ms`, `time_us`) is optional; it is compared with
+//! Rows have the fixed period of the spec. A column `time_s` (or `Time [ms]` and so on) is optional; it is compared with
 //! that period, so that a table played at the wrong speed is found. Axes without a column stay at 0. One run reports
 //! every problem of the file.
 
 use std::path::Path;
 
-use crate::columns::{self, Format, Head, Samples};
+use crate::columns::names::{self, COORDINATES, Conversion};
+use crate::columns::{self, Column, Format, Head, Samples};
 use crate::findings::Findings;
 use specgen_language::diagnostic::{Diagnostic, codes};
 
 /// Most rows: a table is stored in a microcontroller's flash.
 pub const MAX_ROWS: usize = 65_536;
 
-/// Names of the axes in column names.
-const AXES: [&str; 6] = ["x", "y", "z", "theta_x", "theta_y", "theta_z"];
-const LENGTHS: [(&str, f64); 4] = [("nm", 1e-9), ("um", 1e-6), ("mm", 1e-3), ("m", 1.0)];
-const ANGLES: [(&str, f64); 4] = [("nrad", 1e-9), ("urad", 1e-6), ("mrad", 1e-3), ("rad", 1.0)];
-const TIMES: [(&str, f64); 3] = [("us", 1e-6), ("ms", 1e-3), ("s", 1.0)];
 /// Largest deviation of a time column from the period, as a fraction of it: times have few digits.
 const TIME_SLACK: f64 = 1e-3;
 
@@ -51,29 +47,27 @@ pub fn parse(text: &str, shown_as: &str, period: f64) -> Result<Waveform, Vec<Di
     findings.conclude(waveform).map(|(waveform, _)| waveform)
 }
 
-/// Axis of a column, none for the time, and its unit in SI units.
-type Meaning = (Option<usize>, f64);
+/// Axis of a column, none for the time, and the conversion to µm, µrad or s.
+type Meaning = (Option<usize>, Conversion);
 
 fn parse_rows(text: &str, shown_as: &str, period: f64, findings: &mut Findings) -> Option<Waveform> {
     let (header, lines) = columns::open(text.as_bytes(), &FORMAT, findings)?;
     if header.names.iter().all(String::is_empty) {
         return findings.refuse(codes::WAVEFORM_HEADER, None, "is empty".to_owned(), EXPECTED);
     }
-    let columns = meanings(&header, findings)?;
-    let all: Vec<columns::Column> =
-        header.names.iter().enumerate().map(|(at, name)| columns::Column::plain(at, name)).collect();
+    let meanings = meanings(&header, findings)?;
+    let columns = meanings.iter().zip(&header.names).enumerate();
+    let all: Vec<Column> = columns.map(|(at, (&(_, conversion), name))| Column { at, name, conversion }).collect();
     let Samples { lines, columns: values, .. } = lines.read(&all, findings);
     let lines: Vec<usize> = lines.iter().collect();
     let mut rows = vec![[0.0; 6]; lines.len()];
-    for (column, values) in columns.iter().zip(&values) {
-        match *column {
-            (None, unit) => {
-                let times = lines.iter().zip(values).filter(|(_, time)| time.is_finite());
-                check_times(&times.map(|(line, time)| (*line, time * unit)).collect::<Vec<_>>(), period, findings);
+    for ((axis, _), values) in meanings.iter().zip(&values) {
+        match *axis {
+            None => {
+                let times = lines.iter().copied().zip(values.iter().copied()).filter(|(_, time)| time.is_finite());
+                check_times(&times.collect::<Vec<_>>(), period, findings);
             }
-            (Some(axis), unit) => {
-                rows.iter_mut().zip(values).for_each(|(row, value)| row[axis] = value * unit);
-            }
+            Some(axis) => rows.iter_mut().zip(values).for_each(|(row, value)| row[axis] = value * 1e-6),
         }
     }
     if !(2..=MAX_ROWS).contains(&rows.len()) {
@@ -125,25 +119,20 @@ fn meanings(header: &Head, findings: &mut Findings) -> Option<Vec<Meaning>> {
 
 /// The meaning of a name, or how to fix the name.
 fn meaning(name: &str) -> Result<Meaning, String> {
-    let lower = name.to_ascii_lowercase();
-    let (quantity, unit) = lower.rsplit_once('_').unwrap_or((lower.as_str(), ""));
-    let size = |units: &[(&str, f64)]| units.iter().find(|(name, _)| *name == unit).map(|(_, size)| *size);
-    let names = |units: &[(&str, f64)]| {
-        let all: Vec<String> = units.iter().map(|(unit, _)| format!("`{quantity}_{unit}`")).collect();
-        format!("the unit is part of the name: {}", all.join(", "))
-    };
+    let coordinates = COORDINATES.iter().enumerate().map(|(axis, quantity)| (Some(axis), quantity));
+    let all: Vec<_> = coordinates.chain(names::quantity("time_s").map(|time| (None, time))).collect();
+    if let Some(found) = all.iter().find_map(|(axis, quantity)| Some((*axis, quantity.fits(name)?.1))) {
+        return Ok((found.0, Conversion::unit(found.1)));
+    }
     // `theta_x` alone is an axis without unit, not a quantity `theta` in a unit x.
-    if let Some(axis) = AXES.iter().position(|axis| *axis == lower) {
-        return Err(format!("the unit is part of the name: `{name}_{}`", if axis < 3 { "um" } else { "urad" }));
+    if let Some((_, quantity)) = all.iter().find(|(_, quantity)| quantity.is_named(name)) {
+        return Err(format!("the unit is part of the name: `{name}_{}`", quantity.unit()));
     }
-    if quantity == "time" || quantity == "t" {
-        return size(&TIMES).map(|unit| (None, unit)).ok_or_else(|| names(&TIMES));
+    let without_unit = name.rsplit_once(['_', ' ', '(', '[', '/', ',']).map_or(name, |(quantity, _)| quantity);
+    match all.iter().find(|(_, quantity)| quantity.is_named(without_unit)) {
+        Some((_, quantity)) => Err(format!("the unit is part of the name: {}", quantity.all_names())),
+        None => Err(EXPECTED.to_owned()),
     }
-    if let Some(axis) = AXES.iter().position(|axis| *axis == quantity) {
-        let units = if axis < 3 { &LENGTHS } else { &ANGLES };
-        return size(units).map(|unit| (Some(axis), unit)).ok_or_else(|| names(units));
-    }
-    Err(EXPECTED.to_owned())
 }
 
 /// Times rise by the period from row to row.
@@ -177,13 +166,17 @@ mod tests {
         let waveform = parse(text.trim_start_matches('\u{feff}'), "w.csv", 1e-3).unwrap();
         assert_eq!(waveform.lines, [3, 4]);
         assert_eq!(waveform.rows, [[-1e-6, 0.0, 0.0, 0.0, 0.0, 0.5e-3], [25.0 * 1e-6, 0.0, 0.0, 0.0, 0.0, 0.0]]);
+        let other = parse("Time [s];X (mm);Rx deg;Z, nm\n0;0,001;180;7\n0,001;0;0;0\n", "w.csv", 1e-3).unwrap();
+        let [x, _, z, theta_x, ..] = other.rows[0];
+        let near = |value: f64, expected: f64| (value / expected - 1.0).abs() < 1e-12;
+        assert!(near(x, 1e-6) && near(z, 7e-9) && near(theta_x, core::f64::consts::PI), "{:?}", other.rows);
     }
 
     #[test]
     fn a_bad_header_comes_with_its_fix() {
         assert!(refused("")[0].contains("is empty"));
         assert!(refused("x_um,x_nm\n1,2\n")[0].contains("hold the same coordinate"));
-        assert!(refused("x_um,theta_x_deg\n")[0].contains("`theta_x_rad`"));
+        assert!(refused("x_um,theta_x_turns\n")[0].contains("`theta_x_rad`"));
         assert!(refused("x_um,z_V\n")[0].contains("`z_um`"));
         assert!(refused("theta_x\n")[0].contains("`theta_x_urad`"));
         assert!(refused("pitch\n")[0].contains("is not a column of a table"));

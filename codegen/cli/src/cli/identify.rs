@@ -3,7 +3,7 @@
 //! `specgen identify RECORD` identifies the Everett table, or refits the legs if the record is a recorded run; the other
 //! kinds are subcommands. A record with the name of a subcommand is given as `./linear`.
 
-use clap::{Args, Subcommand};
+use clap::{Arg, Args, Subcommand};
 use specgen_identify::mode::Mode;
 use specgen_identify::{DeadTime, Reading};
 use specgen_language::model::LegModelKind;
@@ -22,7 +22,8 @@ use super::plot::Plot;
     args_conflicts_with_subcommands = true,
     subcommand_negates_reqs = true,
     override_usage = "specgen identify [OPTIONS] --drive <MIN:MAX> <RECORD>...\n       specgen identify [OPTIONS] --spec <SPEC> <RUN.rec>\n       specgen identify <COMMAND>",
-    after_help = super::examples::IDENTIFY
+    after_help = super::examples::IDENTIFY,
+    mut_arg("series", table)
 )]
 pub struct Arguments {
     #[command(subcommand)]
@@ -52,8 +53,8 @@ enum Kind {
 /// Arguments of `identify RECORD`.
 #[derive(Args, Debug)]
 struct EverettArguments {
-    /// Reversal-curve record (CSV, MATLAB, HDF5, TDMS) with columns time_s, drive_V, displacement_um; further ones of
-    /// the same leg, at other rates, are fitted together with it. With --spec: a recorded run of a platform, from which
+    /// Reversal-curve record (CSV, MATLAB, HDF5, TDMS, NumPy) with columns time_s, drive_V, displacement_um; further ones
+    /// of the same leg, at other rates, are fitted together with it. With --spec: a recorded run of a platform, from which
     /// gain, delay and cubic term of each leg are refitted.
     #[arg(required = true, value_name = "RECORD")]
     records: Vec<InputFile>,
@@ -61,7 +62,7 @@ struct EverettArguments {
     #[arg(long, value_name = "MIN:MAX", value_parser = range, allow_hyphen_values = true)]
     drive: Option<[f64; 2]>,
     /// The spec that the target of a recorded run was built from. It has the range and the grid.
-    #[arg(long, value_name = "SPEC", conflicts_with_all = ["drive", "grid", "dead_time", "model", "validate", "columns", "rate", "plot"])]
+    #[arg(long, value_name = "SPEC", conflicts_with_all = ["drive", "grid", "dead_time", "model", "validate", "columns", "rate", "series", "plot"])]
     spec: Option<InputFile>,
     /// Cells per axis of the Preisach grid; chosen by cross-validation over whole curves if not given.
     #[arg(long, value_name = "N", value_parser = grid, allow_negative_numbers = true)]
@@ -87,7 +88,7 @@ struct EverettArguments {
 
 /// Arguments of `identify linear`.
 #[derive(Args, Debug)]
-#[command(after_help = super::examples::LINEAR)]
+#[command(after_help = super::examples::LINEAR, mut_arg("series", table))]
 struct LinearArguments {
     /// Records at one frequency each: CSV with columns time_s, drive_V, displacement_um. The drive may be the output of an
     /// inverse hysteresis model, as in the paper.
@@ -108,7 +109,7 @@ struct LinearArguments {
 
 /// Arguments of `identify response`.
 #[derive(Args, Debug)]
-#[command(after_help = super::examples::RESPONSE)]
+#[command(after_help = super::examples::RESPONSE, mut_arg("series", table))]
 struct ResponseArguments {
     /// Swept sine, multisine or noise: CSV with columns time_s, drive_V, displacement_um, evenly sampled.
     record: InputFile,
@@ -151,7 +152,7 @@ struct GaugeArguments {
 
 /// Arguments of `identify predict`.
 #[derive(Args, Debug)]
-#[command(after_help = super::examples::PREDICT)]
+#[command(after_help = super::examples::PREDICT, mut_arg("series", table))]
 struct PredictArguments {
     /// The model: a table written by `specgen identify -o`, a spec (.toml), with its tables, rate tables, creep and dead time, or
     /// the lines of one leg that `identify rate -o` writes.
@@ -179,7 +180,7 @@ struct PredictArguments {
 
 /// Arguments of `identify stiffness`.
 #[derive(Args, Debug)]
-#[command(after_help = super::examples::STIFFNESS)]
+#[command(after_help = super::examples::STIFFNESS, mut_arg("series", table))]
 struct StiffnessArguments {
     /// CSV with columns time_s, force_N (positive if it increases the displacement), displacement_um, and optionally drive_V,
     /// which must be constant.
@@ -190,7 +191,7 @@ struct StiffnessArguments {
 
 /// Arguments of `identify rate`.
 #[derive(Args, Debug)]
-#[command(after_help = super::examples::RATE)]
+#[command(after_help = super::examples::RATE, mut_arg("series", table))]
 struct RateArguments {
     /// At least two records of one leg at different rates: CSV with columns time_s, drive_V, displacement_um.
     #[arg(required = true, value_name = "RECORD")]
@@ -214,13 +215,16 @@ struct RateArguments {
 /// Arguments of every kind of record.
 #[derive(Args, Debug)]
 struct BenchArguments {
-    /// Map columns, given by header or number (from 1), to names with units, such as drive_mV=Voltage,time_s=1. If not given,
-    /// columns are found by their headers.
-    #[arg(long, value_name = "NAME=COLUMN,…", value_delimiter = ',')]
+    /// Map columns, given by header or number (from 1), to names with units, such as drive_mV=Voltage,time_s=1, or with a
+    /// scale and an offset, as in 'displacement=CH2*5 um/V+0.3 um'. If not given, columns are found by their headers.
+    #[arg(long, value_name = "NAME=COLUMN,…")]
     columns: Vec<String>,
     /// Sampling rate, Hz: time is computed from the column `sample`, or else from row numbers.
     #[arg(long, value_name = "HZ", value_parser = number("Hz", "samples per second above zero", 1e-3..=1e9), allow_negative_numbers = true)]
     rate: Option<f64>,
+    /// Table to read of a file that has several, by number (from 1) or name; the longest if not given.
+    #[arg(long, value_name = "N|NAME")]
+    series: Option<String>,
     #[command(flatten)]
     plot: Plot,
 }
@@ -229,8 +233,13 @@ impl BenchArguments {
     fn bench(&self) -> Result<Bench, Failure> {
         let reading = Reading::new(&self.columns, self.rate);
         let reading = reading.map_err(|why| Failure::Usage(format!("--columns: {why}")))?;
-        Ok(Bench { reading, plot: self.plot.place() })
+        Ok(Bench { reading: reading.of_series(self.series.clone()), plot: self.plot.place() })
     }
+}
+
+/// `--series` is also `--table`, except for `gauge`, which writes one.
+fn table(series: Arg) -> Arg {
+    series.visible_alias("table")
 }
 
 /// Plausible voltages; `actuator.voltage` of a spec has the same range.

@@ -21,68 +21,78 @@ fn is_there(program: &str) -> bool {
 }
 
 #[test]
-fn records_in_other_forms_become_text_and_stay() {
+fn records_in_other_forms_are_read_as_they_are() {
     let record = fs::read(repository().join("specs/records/leg1.csv")).unwrap();
     let text = String::from_utf8(record.clone()).unwrap();
-    let kinds: [(&str, &str, Vec<u8>, bool); 8] = [
-        (".csv", "iconv", utf16(&text, true, false), true),
-        (".csv", "iconv", utf16(&text, true, true), true),
-        (".csv", "gunzip", gzip(&record), true),
-        (".csv.gz", "gunzip", gzip(&record), true),
-        (".mat", "python3", b"MATLAB 5.0 MAT-file, damaged".to_vec(), false),
-        (".h5", "python3", b"\x89HDF\r\n\x1a\ndamaged".to_vec(), false),
-        (".tdms", "python3", b"TDSmdamaged".to_vec(), false),
-        (".npy", "python3", b"\x93NUMPY\x01\0".to_vec(), false),
-    ];
-    for (number, (ending, program, content, is_record)) in kinds.into_iter().enumerate() {
-        if !is_there(program) {
-            continue;
-        }
-        // In the short run, one name for each.
-        for name in length(&NAMES[number % NAMES.len()..][..1], &NAMES) {
-            let folder = Folder::new();
-            let name = format!("{name}{ending}");
-            folder.write(&name, &content);
-            // An existing file is not overwritten.
-            folder.write("leg.utf8.csv", "mine");
-            let before = files(&folder);
-            let identify = ["--drive", "0:100", "--grid", "4"];
-            let (code, text) = run(&folder, &["identify"], &name, &identify);
-            let lines = printed(&text, program);
-            let [line] = &lines[..] else { panic!("{name}: {text}") };
-            assert_eq!(code, 1, "{text}");
-            let output = shell(&folder, line);
-            assert!(output.status.success(), "{line}: {output:?}");
-            let mut after = files(&folder);
-            let new: Vec<String> = after.keys().filter(|file| !before.contains_key(*file)).cloned().collect();
-            let [new] = &new[..] else { panic!("{line}: {new:?}") };
-            let made = after.remove(new).unwrap();
-            assert_eq!(after, before, "{line}");
-            assert!(text.contains(new.as_str()), "the help names {new}: {text}");
-            if is_record {
-                assert!(made == record, "{line}");
-                let (code, text) = run(&folder, &["identify"], new, &identify);
-                assert_eq!(code, 0, "{text}");
-            } else {
-                assert!(made.starts_with(b"a_V,b\n1,") || made.starts_with(b"1,2"), "{line}");
-            }
-        }
+    let folder = Folder::new();
+    for (name, content) in
+        [("le.csv", utf16(&text, true, false)), ("be.csv", utf16(&text, true, true)), ("leg.csv.gz", gzip(&record))]
+    {
+        folder.write(name, &content);
+        let (code, said) = run(&folder, &["identify"], name, &["--drive", "0:100", "--grid", "4"]);
+        assert_eq!(code, 0, "{name}: {said}");
+        let spec = format!("{name}.toml");
+        let of_spec = folder.read("legs.toml").replace("records/reference-forc.csv", name);
+        folder.write(&spec, of_spec.replace("grid    = 32", "grid    = 8"));
+        let (code, said) = run(&folder, &["check"], &spec, &[]);
+        assert_eq!(code, 0, "{name}: {said}");
     }
-    // The record is relative to the spec, not to the current folder.
-    if is_there("iconv") {
+}
+
+/// An array of NumPy with a row for each sample.
+fn npy(rows: &[[f64; 3]]) -> Vec<u8> {
+    let header = format!("{{'descr': '<f8', 'fortran_order': False, 'shape': ({}, 3), }}\n", rows.len());
+    let values = rows.iter().flatten().flat_map(|value| value.to_le_bytes());
+    [b"\x93NUMPY\x01\0", &(header.len() as u16).to_le_bytes()[..], header.as_bytes()]
+        .concat()
+        .into_iter()
+        .chain(values)
+        .collect()
+}
+
+/// Files that need options: those of every message are given, and the file is read.
+#[test]
+fn suggested_options_are_accepted() {
+    let text = fs::read_to_string(repository().join("specs/records/leg1.csv")).unwrap();
+    let number = |field: &str| field.parse::<f64>().unwrap();
+    let rows = text.lines().skip(1).filter(|line| !line.starts_with('#'));
+    let rows: Vec<[f64; 3]> =
+        rows.map(|line| line.split(',').map(number).collect::<Vec<_>>().try_into().unwrap()).collect();
+    let file = |header: &str, separator: &str| {
+        let line = |row: &[f64; 3]| row.map(|value| value.to_string()).join(separator) + "\n";
+        (header.to_owned() + &rows.iter().map(line).collect::<String>()).into_bytes()
+    };
+    let untimed = |separator: &str| rows.iter().map(|[_, u, y]| format!("{u}{separator}{y}\n")).collect::<String>();
+    let numbered = rows.iter().enumerate().map(|(k, [_, u, y])| format!("{k};{u};{y}\n")).collect::<String>();
+    let empty_first = rows.iter().map(|[t, u, y]| format!(",{t},{u},{y}\n")).collect::<String>();
+    let files: [(&str, Vec<u8>); 12] = [
+        ("commas.csv", file("Time,s;Ch 1,V;Ch2,um\n", ";")),
+        ("pairs.csv", file("Time,s,Ch1,V,Ch2,um\n", ",")),
+        ("numbers.csv", file("", ",")),
+        ("empty.csv", empty_first.clone().into_bytes()),
+        ("index.csv", format!(",t,U,y\n{empty_first}").into_bytes()),
+        ("untimed.txt", format!("U\ty\n{}", untimed("\t")).into_bytes()),
+        ("untimed.csv", untimed(";").into_bytes()),
+        ("samples.csv", format!("sample;U;it's $y\n{numbered}").into_bytes()),
+        ("near.csv", file("tme_s,drive,displacement_in\n", ",")),
+        ("same.csv", file("a,a,a=`b`\n", ",")),
+        ("scope.csv", file("Model,X\nSource,CH1,CH2\nTIME,CH1,CH2\n", ",")),
+        ("rows.npy", npy(&rows)),
+    ];
+    for (name, content) in files {
         let folder = Folder::new();
-        fs::create_dir_all(folder.path("my specs/records")).unwrap();
-        fs::copy(folder.path("legs.toml"), folder.path("my specs/legs.toml")).unwrap();
-        folder.write("my specs/records/reference-forc.csv", utf16(&text, true, false));
-        let before = files(&folder);
-        let (_, text) = run(&folder, &["check"], "my specs/legs.toml", &[]);
-        let line = printed(&text, "iconv").remove(0);
-        assert!(shell(&folder, &line).status.success(), "{line}");
-        let mut after = files(&folder);
-        assert!(
-            after.remove("my specs/records/reference-forc.utf8.csv").unwrap() == record && after == before,
-            "{line}"
-        );
+        folder.write(name, content);
+        let identify = ["--drive", "0:100", "--grid", "4"];
+        let (code, said) = run(&folder, &["identify"], name, &identify);
+        assert_eq!(code, 1, "{name}: {said}");
+        let options: Vec<&str> =
+            said.split('`').filter(|text| text.starts_with("--")).filter(|text| text.contains(' ')).collect();
+        assert!(!options.is_empty(), "{name}: {said}");
+        for options in options {
+            let line = format!("specgen identify {name} --drive 0:100 --grid 4 {}", options.replace("HZ", "12.8"));
+            let output = shell(&folder, &line);
+            assert!(output.status.success(), "{line}: {output:?}");
+        }
     }
 }
 

@@ -15,6 +15,8 @@ pub(crate) struct Head {
     pub(crate) line: usize,
     /// Time between samples stated in the preamble, s.
     pub(crate) interval: Option<f64>,
+    /// Columns, from 0, that have a number in the first sample.
+    pub(crate) filled: Vec<usize>,
     /// Index of the first line after them.
     pub(super) next: usize,
     /// Separator of the samples.
@@ -42,13 +44,10 @@ pub(super) fn find(lines: &[Line], preamble: bool) -> Option<Head> {
         // Some programs write the names into the last comment.
         Some(row) if row == first => match above(row, &is_comment) {
             Some(at) if known(at) > 1 => Some(Head { next: row, ..at_line(lines, at, interval) }),
-            _ => Some(Head {
-                names: Vec::new(),
-                line: lines[row].0,
-                next: row,
-                separator: separator_of(&lines[row].1).unwrap_or(b','),
-                interval,
-            }),
+            _ => {
+                let separator = separator_of(&lines[row].1).unwrap_or(b',');
+                Some(Head { next: row, interval, ..Head::without_names(lines[row].0, separator) })
+            }
         },
         Some(row) => {
             // A line with a number among its fields is an invalid row of numbers.
@@ -72,12 +71,19 @@ fn at_line(lines: &[Line], at: usize, interval: Option<f64>) -> Head {
         }
         next += 1;
     }
-    let separator = lines[next..].iter().find_map(|(_, line)| separator_of(line));
-    Head { names, line: *line, next, separator: separator.unwrap_or_else(|| of_names(text)), interval }
+    let rows = lines[next..].iter().find_map(|(_, line)| Some((separator_of(line)?, line)));
+    let separator = rows.map_or_else(|| of_names(text), |(separator, _)| separator);
+    if rows.is_some_and(|(separator, row)| names.len() == 2 * split(row, separator).len())
+        && names[1..].iter().step_by(2).all(|unit| names::is_unit(unit))
+    {
+        // `Time,s,Ch1,V` above columns that commas separate.
+        names = names.chunks(2).map(|pair| pair.join(",")).collect();
+    }
+    Head { names, next, interval, ..Head::without_names(*line, separator) }
 }
 
 /// The separator with which a line is a row of numbers.
-fn separator_of(line: &[u8]) -> Option<u8> {
+pub(super) fn separator_of(line: &[u8]) -> Option<u8> {
     SEPARATORS.into_iter().find(|separator| is_row(line, *separator))
 }
 
@@ -90,7 +96,7 @@ fn of_names(line: &[u8]) -> u8 {
     SEPARATORS.into_iter().rev().max_by_key(|separator| known(*separator)).unwrap_or(b',')
 }
 
-fn names_of(line: &[u8]) -> Vec<String> {
+pub(super) fn names_of(line: &[u8]) -> Vec<String> {
     let line = line.strip_prefix(b"#").or_else(|| line.strip_prefix(b"%")).unwrap_or(line);
     split(line, of_names(line)).into_iter().map(decoded).collect()
 }
@@ -111,6 +117,19 @@ fn interval(line: &[u8]) -> Option<f64> {
 const ROWS: usize = 10;
 
 impl Head {
+    /// Of a file without names whose first sample is in `line`.
+    pub(super) fn without_names(line: usize, separator: u8) -> Self {
+        Self { names: Vec::new(), line, interval: None, filled: Vec::new(), next: 0, separator }
+    }
+
+    /// Finds the columns that have numbers in the first of the `lines` of samples.
+    pub(super) fn find_filled(&mut self, lines: &[Line]) {
+        let Some((_, row)) = lines.iter().find(|(_, line)| has_fields(line)) else { return };
+        let is_number = |field: &[u8]| number(&decoded(field), self.separator).is_some();
+        let fields = split(row, self.separator).into_iter().enumerate();
+        self.filled = fields.filter(|(_, field)| is_number(field)).map(|(at, _)| at).collect();
+    }
+
     /// The line, the message and the help if commas are both decimal signs and separators in the `lines` of samples.
     pub(super) fn ambiguous_commas(&self, lines: &[Line]) -> Option<(usize, String, String)> {
         let count = self.names.len();
@@ -186,7 +205,7 @@ pub(super) fn number(field: &str, separator: u8) -> Option<(f64, Option<char>)> 
 }
 
 /// Whether a line is a row of numbers: at least two fields, some of which may be empty, but not all.
-fn is_row(line: &[u8], separator: u8) -> bool {
+pub(super) fn is_row(line: &[u8], separator: u8) -> bool {
     let fields = split(line, separator);
     let is_number = |field: &&[u8]| std::str::from_utf8(field).is_ok_and(|text| number(text, separator).is_some());
     let filled = fields.iter().filter(|field| !field.is_empty());
@@ -231,6 +250,8 @@ mod tests {
             ("LabVIEW\t\nTime\t12:30\n***End***\t\nX_Value\tA\tB\n0,1\t2\t3\n", 4, &["X_Value", "A", "B"], b'\t'),
             ("sep=;\nt (s);a\n0,1;2\n", 2, &["t (s)", "a"], b';'),
             ("a;b\ns;V\n0;1\n", 1, &["a [s]", "b [V]"], b';'),
+            ("Time,s;Ch1,V\n0;1\n", 1, &["Time,s", "Ch1,V"], b';'),
+            ("Time,s,Ch1,V\n0,1\n", 1, &["Time,s", "Ch1,V"], b','),
             ("# time_s drive_V\n0.1 2\n", 1, &["time_s", "drive_V"], b' '),
             ("0;1\n2;3\n", 1, &[], b';'),
             ("drve_V,t_s\nx,1\n0,1\n", 1, &["drve_V", "t_s"], b','),

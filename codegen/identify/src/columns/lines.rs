@@ -2,6 +2,7 @@
 
 use std::collections::VecDeque;
 use std::io::{self, BufRead, BufReader, Read};
+use std::ops::Range;
 
 use super::head::Line;
 
@@ -30,6 +31,15 @@ impl<'a> LineReader<'a> {
             }
             None => self.fetch(line),
         }
+    }
+
+    /// Skips the lines before `line`, counted from 1; returns whether any of them `has` a property.
+    pub(super) fn skip_to(&mut self, line: usize, has: impl Fn(&[u8]) -> bool) -> io::Result<bool> {
+        let (mut any, mut skipped) = (false, Vec::new());
+        while self.read + 1 < line && self.fetch(&mut skipped)?.is_some() {
+            any |= has(&skipped);
+        }
+        Ok(any)
     }
 
     /// The first lines, at most `count`. [`LineReader::next`] returns them again from index `from` on, see
@@ -104,6 +114,13 @@ impl LineNumbers {
         after.checked_sub(1).map_or(1, |run| self.runs[run].1 + sample - self.runs[run].0)
     }
 
+    /// The lines of some of the samples.
+    pub(crate) fn part(&self, samples: Range<usize>) -> Self {
+        let mut part = Self::default();
+        samples.for_each(|sample| part.push(self.at(sample)));
+        part
+    }
+
     pub(crate) fn iter(&self) -> impl Iterator<Item = usize> + '_ {
         (0..self.len).map(|sample| self.at(sample))
     }
@@ -119,6 +136,7 @@ mod tests {
         let mut numbers = LineNumbers::default();
         lines.iter().for_each(|line| numbers.push(*line));
         assert_eq!((numbers.iter().collect::<Vec<_>>(), numbers.len(), numbers.runs.len()), (lines.to_vec(), 6, 3));
+        assert_eq!(numbers.part(2..5).iter().collect::<Vec<_>>(), [4, 7, 8]);
         assert_eq!(LineNumbers::consecutive(2, 3).iter().collect::<Vec<_>>(), [2, 3, 4]);
     }
 }

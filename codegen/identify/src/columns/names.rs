@@ -13,9 +13,39 @@ pub(crate) struct Quantity {
 /// Name of a unit, and its number in one unit of [`Quantity::name`].
 type Unit = (&'static str, f64);
 
+/// How a number of a column becomes one of its quantity: it is divided by `per`, then scaled.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Conversion {
+    /// Number of the column's units in one unit of the quantity.
+    pub(crate) per: f64,
+    /// Factor, then offset in units of the quantity; none for a column that only has another unit.
+    pub(crate) scale: Option<[f64; 2]>,
+}
+
+impl Conversion {
+    /// From a unit of which `per` are one of the quantity's.
+    pub(crate) const fn unit(per: f64) -> Self {
+        Self { per, scale: None }
+    }
+
+    /// The value in units of the quantity.
+    pub(crate) fn apply(self, value: f64) -> f64 {
+        let value = value / self.per;
+        self.scale.map_or(value, |[factor, offset]| value * factor + offset)
+    }
+}
+
 const TIME: &[Unit] = &[("s", 1.0), ("ms", 1e3), ("us", 1e6), ("ns", 1e9)];
 const VOLTAGE: &[Unit] = &[("V", 1.0), ("mV", 1e3), ("uV", 1e6), ("kV", 1e-3)];
 const LENGTH: &[Unit] = &[("um", 1.0), ("nm", 1e3), ("pm", 1e6), ("mm", 1e-3), ("m", 1e-6)];
+const ANGLE: &[Unit] = &[
+    ("urad", 1.0),
+    ("nrad", 1e3),
+    ("mrad", 1e-3),
+    ("rad", 1e-6),
+    ("deg", 1e-6 * core::f64::consts::FRAC_1_PI * 180.0),
+    ("arcsec", 1e-6 * core::f64::consts::FRAC_1_PI * 180.0 * 3600.0),
+];
 const FORCE: &[Unit] = &[("N", 1.0), ("mN", 1e3), ("kN", 1e-3)];
 
 /// Every quantity of a record.
@@ -27,6 +57,16 @@ pub(crate) static QUANTITIES: [Quantity; 7] = [
     Quantity { name: "force_N", also: &["kraft"], units: FORCE },
     Quantity { name: "gauge_V", also: &[], units: VOLTAGE },
     Quantity { name: "reference_um", also: &["ref"], units: LENGTH },
+];
+
+/// The coordinates of a pose, in the order of a row.
+pub(crate) static COORDINATES: [Quantity; 6] = [
+    Quantity { name: "x_um", also: &[], units: LENGTH },
+    Quantity { name: "y_um", also: &[], units: LENGTH },
+    Quantity { name: "z_um", also: &[], units: LENGTH },
+    Quantity { name: "theta_x_urad", also: &["thetax", "rx", "θx"], units: ANGLE },
+    Quantity { name: "theta_y_urad", also: &["thetay", "ry", "θy"], units: ANGLE },
+    Quantity { name: "theta_z_urad", also: &["thetaz", "rz", "θz"], units: ANGLE },
 ];
 
 /// Names of a column with sample numbers.
@@ -65,9 +105,9 @@ impl Quantity {
         }
     }
 
-    /// Number of `unit` in one of our units.
-    fn per(&self, unit: &str) -> Option<f64> {
-        self.units.iter().find(|(name, _)| name.eq_ignore_ascii_case(unit)).map(|(_, per)| *per)
+    /// Number of `text`, a unit, in one of our units.
+    pub(crate) fn per(&self, text: &str) -> Option<f64> {
+        per(self.units, &unit(text))
     }
 
     /// The same for a name such as `drive_mV`; `None` if that is another quantity, or has no unit of it.
@@ -78,7 +118,18 @@ impl Quantity {
 
     /// Its name without the unit.
     pub(crate) fn plain(&self) -> &'static str {
-        self.name.split('_').next().unwrap_or(self.name)
+        self.name.rsplit_once('_').map_or(self.name, |(plain, _)| plain)
+    }
+
+    /// Whether `header` names this quantity without a unit.
+    pub(crate) fn is_named(&self, header: &str) -> bool {
+        let name = plain(header);
+        name == plain(self.plain()) || self.also.contains(&name.as_str())
+    }
+
+    /// Its unit.
+    pub(crate) fn unit(&self) -> &'static str {
+        self.units[0].0
     }
 
     /// Its names with the units that are accepted.
@@ -86,6 +137,31 @@ impl Quantity {
         let name = |(unit, _): &Unit| format!("`{}_{unit}`", self.plain());
         self.units.iter().map(name).collect::<Vec<_>>().join(", ")
     }
+}
+
+fn per(units: &[Unit], unit: &str) -> Option<f64> {
+    units.iter().find(|(name, _)| name.eq_ignore_ascii_case(unit)).map(|(_, per)| *per)
+}
+
+/// Number of the header's units in one of `denominator`, such as 1000 for `CH2 (mV)` and `V`.
+///
+/// # Errors
+/// The header's unit, if it is of another kind. A unit that is not known counts as equal.
+pub(crate) fn per_denominator(header: &str, denominator: &str) -> Result<f64, String> {
+    let (Some(own), denominator) = (parts(header).1, unit(denominator)) else { return Ok(1.0) };
+    let kinds = [TIME, VOLTAGE, LENGTH, FORCE];
+    let kind = |unit: &str| kinds.into_iter().find_map(|kind| per(kind, unit).map(|per| (kind[0].0, per)));
+    match (kind(&own), kind(&denominator)) {
+        (Some((a, own)), Some((b, other))) if a == b => Ok(own / other),
+        (Some(_), Some(_)) => Err(own),
+        _ => Ok(1.0),
+    }
+}
+
+/// The unit in brackets at the end of a header, such as `um/s` of `vx (um/s)`.
+pub(crate) fn unit_in_brackets(header: &str) -> Option<String> {
+    let inner = |open: char, close: char| Some(header.trim().strip_suffix(close)?.rsplit_once(open)?.1);
+    inner('(', ')').or_else(|| inner('[', ']')).map(unit)
 }
 
 /// Whether a header names sample numbers.
@@ -100,8 +176,8 @@ pub(crate) fn is_known(header: &str) -> bool {
 
 /// Whether a field of a line below the names is a unit.
 pub(crate) fn is_unit(field: &str) -> bool {
-    let unit = unit(field.trim_matches(['[', ']', '(', ')']));
-    QUANTITIES.iter().any(|quantity| quantity.per(&unit).is_some())
+    let unit = field.trim_matches(['[', ']', '(', ')']);
+    QUANTITIES.iter().any(|quantity| quantity.per(unit).is_some())
 }
 
 /// Lower case letters and digits of a name.
@@ -117,7 +193,7 @@ fn parts(header: &str) -> (String, Option<String>) {
             return (plain(name), Some(unit(inner)));
         }
     }
-    match header.rsplit_once(['_', '/', ' ']) {
+    match header.rsplit_once(['_', '/', ',', ' ']) {
         Some((name, inner)) => (plain(name), Some(unit(inner))),
         None => (plain(header), None),
     }
@@ -130,6 +206,7 @@ fn unit(text: &str) -> String {
         "volt" | "volts" => "v".to_owned(),
         "sec" | "seconds" => "s".to_owned(),
         "micron" | "microns" => "um".to_owned(),
+        "°" | "degree" | "degrees" => "deg".to_owned(),
         _ => text,
     }
 }
@@ -145,6 +222,7 @@ mod tests {
             ("TIME_S", "time_s", Some((Fit::Exact, 1.0))),
             ("Time (ms)", "time_s", Some((Fit::OtherUnit, 1e3))),
             ("t/s", "time_s", Some((Fit::OtherName, 1.0))),
+            ("Time,ms", "time_s", Some((Fit::OtherUnit, 1e3))),
             ("X_Value", "time_s", Some((Fit::OtherName, 1.0))),
             ("Zeit [s]", "time_s", Some((Fit::OtherName, 1.0))),
             ("Drive_mV", "drive_V", Some((Fit::OtherUnit, 1e3))),
@@ -159,6 +237,22 @@ mod tests {
         ] {
             assert_eq!(quantity(name).unwrap().fits(header), expected, "{header}");
         }
+        assert_eq!(per_denominator("CH2 (mV)", "V"), Ok(1e3));
+        assert_eq!(per_denominator("CH2", "V"), Ok(1.0));
+        assert_eq!(per_denominator("CH2 [um]", "V"), Err("um".to_owned()));
+        for (header, at, expected) in [
+            ("x (um)", 0, Some((Fit::OtherUnit, 1.0))),
+            ("X_MM", 0, Some((Fit::OtherUnit, 1e-3))),
+            ("rx [mrad]", 3, Some((Fit::OtherName, 1e-3))),
+            ("theta_z_rad", 5, Some((Fit::OtherName, 1e-6))),
+            ("theta_x", 3, None),
+            ("rx", 3, None),
+        ] {
+            assert_eq!(COORDINATES[at].fits(header), expected, "{header}");
+            assert_eq!(COORDINATES[at].is_named(header), expected.is_none(), "{header}");
+        }
+        let (_, per) = COORDINATES[4].fits("Ry deg").unwrap();
+        assert!((Conversion::unit(per).apply(180.0) * 1e-6 - core::f64::consts::PI).abs() < 1e-12, "{per}");
         assert!(is_unit("[µm]") && is_unit("Volts") && !is_unit("1") && is_sample_number("Sample"));
         assert_eq!(quantity("drive_V").unwrap().all_names(), "`drive_V`, `drive_mV`, `drive_uV`, `drive_kV`");
         assert_eq!(quantity("force_N").unwrap().all_names(), "`force_N`, `force_mN`, `force_kN`");

@@ -1,4 +1,7 @@
 //! MAT-files of version 5 (MathWorks, MAT-File Format): a sequence of elements, each with type, length and bytes.
+//!
+//! Structs give their arrays. An array with a text beside it is called by that text, as dSPACE writes it: `X.Data` is the
+//! time in s, and each `Y(k).Data` a signal with the name `Y(k).Name`.
 
 use std::io::Read;
 use std::ops::RangeInclusive;
@@ -6,8 +9,10 @@ use std::ops::RangeInclusive;
 use flate2::read::ZlibDecoder;
 
 use super::bytes::{Bytes, DAMAGED};
-use super::{Columns, is_column};
+use super::{Array, Contents, LARGEST};
 
+/// Name of a time in s.
+const TIME: &str = "time_s";
 /// Bytes before the first element; the last two show the byte order.
 const HEADER: usize = 128;
 /// Type of an array, whose parts are elements.
@@ -16,6 +21,22 @@ const ARRAY: u32 = 14;
 const COMPRESSED: u32 = 15;
 /// Classes of arrays of numbers.
 const NUMBERS: RangeInclusive<u8> = 6..=15;
+const STRUCT: u8 = 2;
+const TEXT: u8 = 4;
+/// Objects of classes: texts in double quotes, time series, tables.
+const OPAQUE: u8 = 17;
+/// Levels of structs that are read.
+const DEEPEST: usize = 6;
+
+/// A variable, or a field of a struct.
+enum Value {
+    Numbers(Vec<usize>, Vec<f64>),
+    Text(String),
+    /// Names of the fields, and the values of the fields of each struct in turn.
+    Structs(Vec<String>, Vec<Self>),
+    /// What it is instead.
+    Other(String),
+}
 
 /// Type and bytes of the next element.
 fn element<'a>(from: &mut Bytes<'a>) -> Result<(u32, &'a [u8]), String> {
@@ -53,38 +74,126 @@ fn numbers(from: &mut Bytes) -> Result<Vec<f64>, String> {
     Ok(Bytes { rest, ..*from }.numbers(form))
 }
 
-/// Name and values of an array with these parts; none if it is not a column.
-fn column(mut parts: Bytes) -> Result<Option<(String, Vec<f64>)>, String> {
-    let (_, flags) = element(&mut parts)?;
-    let class = flags.get(if parts.is_big_endian { 3 } else { 0 }).ok_or(DAMAGED)?;
-    if !NUMBERS.contains(class) {
-        return Ok(None);
+/// The text of the next element, in bytes or in units of UTF-16.
+fn text(from: &mut Bytes) -> Result<String, String> {
+    let (kind, rest) = element(from)?;
+    if !matches!(kind, 4 | 17) {
+        return Ok(String::from_utf8_lossy(rest).trim_end_matches('\0').to_owned());
     }
-    let size = numbers(&mut parts)?;
-    let (_, name) = element(&mut parts)?;
-    // For complex numbers, the real part.
-    let values = numbers(&mut parts)?;
-    if size.iter().product::<f64>() != values.len() as f64 {
-        return Err(DAMAGED.to_owned());
-    }
-    Ok(is_column(&size).then(|| (String::from_utf8_lossy(name).into_owned(), values)))
+    let units: Vec<u16> = Bytes { rest, ..*from }.numbers(('u', 2)).into_iter().map(|unit| unit as u16).collect();
+    Ok(String::from_utf16_lossy(&units))
 }
 
-/// The columns of a file.
-pub(super) fn columns(file: &[u8]) -> Result<Columns, String> {
+/// Name and value of an array with these parts.
+fn variable(mut parts: Bytes, depth: usize) -> Result<(String, Value), String> {
+    if parts.rest.is_empty() {
+        return Ok((String::new(), Value::Numbers(Vec::new(), Vec::new())));
+    }
+    let (_, flags) = element(&mut parts)?;
+    let class = *flags.get(if parts.is_big_endian { 3 } else { 0 }).ok_or(DAMAGED)?;
+    if class == OPAQUE {
+        let [name, _system, class] = [text(&mut parts)?, text(&mut parts)?, text(&mut parts)?];
+        return Ok((name, Value::Other(format!("an object of class {class}"))));
+    }
+    // Lengths are integers.
+    let size: Vec<usize> = numbers(&mut parts)?.into_iter().map(|length| length as usize).collect();
+    let count = size.iter().try_fold(1_usize, |count, length| count.checked_mul(*length)).ok_or(DAMAGED)?;
+    let name = text(&mut parts)?;
+    let value = match class {
+        // For complex numbers, the real part.
+        class if NUMBERS.contains(&class) => {
+            let values = numbers(&mut parts)?;
+            if count != values.len() {
+                return Err(DAMAGED.to_owned());
+            }
+            Value::Numbers(size, values)
+        }
+        TEXT => Value::Text(text(&mut parts)?),
+        STRUCT if depth < DEEPEST => {
+            let longest = numbers(&mut parts)?.first().map_or(0, |length| *length as usize);
+            let (_, names) = element(&mut parts)?;
+            let field = |name: &[u8]| {
+                let end = name.iter().position(|byte| *byte == 0).unwrap_or(name.len());
+                String::from_utf8_lossy(&name[..end]).into_owned()
+            };
+            let fields: Vec<String> = names.chunks_exact(longest.max(1)).map(field).collect();
+            let mut values = Vec::new();
+            for _ in 0..count.checked_mul(fields.len()).ok_or(DAMAGED)? {
+                let (_, rest) = element(&mut parts)?;
+                values.push(variable(Bytes { rest, ..parts }, depth + 1)?.1);
+            }
+            Value::Structs(fields, values)
+        }
+        STRUCT => Value::Other("a struct".to_owned()),
+        1 => Value::Other("a cell array".to_owned()),
+        5 => Value::Other("a sparse matrix".to_owned()),
+        _ => Value::Other("no array of numbers".to_owned()),
+    };
+    Ok((name, value))
+}
+
+/// Adds the arrays of `value`, called `name` in `group`.
+fn add(group: &str, name: &str, value: Value, contents: &mut Contents) {
+    match value {
+        // Written after the variables, with the content of their objects.
+        Value::Numbers(..) if name.is_empty() => {}
+        Value::Numbers(size, values) => {
+            contents.arrays.push(Array { group: group.to_owned(), name: name.to_owned(), size, values });
+        }
+        Value::Text(_) if !group.is_empty() => {}
+        Value::Text(_) => contents.others.push((name.to_owned(), "a text".to_owned())),
+        Value::Other(what) => contents.others.push((name.to_owned(), what)),
+        Value::Structs(fields, values) => add_structs(group, name, &fields, values, contents),
+    }
+}
+
+/// Adds the arrays of structs with these fields, called `name` in `group`. Each struct of a variable is a group.
+fn add_structs(group: &str, name: &str, fields: &[String], values: Vec<Value>, contents: &mut Contents) {
+    let count = values.len() / fields.len().max(1);
+    let mut values = values.into_iter();
+    for number in 1..=count {
+        let own: Vec<(&String, Value)> = fields.iter().zip(values.by_ref()).collect();
+        let title = own.iter().find_map(|(field, value)| match value {
+            Value::Text(text) if matches!(field.as_str(), "Name" | "label") => Some(text.trim()),
+            _ => None,
+        });
+        let title = title.filter(|title| !title.is_empty());
+        let is_time = name == "X" && title.is_none_or(|title| title.eq_ignore_ascii_case("time"));
+        let title = if is_time { Some(TIME) } else { title }.map(str::to_owned);
+        let element = if count > 1 { format!("{name}({number})") } else { name.to_owned() };
+        for (field, value) in own {
+            let is_data = matches!(field.as_str(), "Data" | "values");
+            match title.as_ref().filter(|_| is_data) {
+                Some(title) => add(group, title, value, contents),
+                None if group.is_empty() => add(&element, field, value, contents),
+                None => add(group, &format!("{element}.{field}"), value, contents),
+            }
+        }
+    }
+}
+
+/// The arrays of a file.
+pub(super) fn contents(file: &[u8]) -> Result<Contents, String> {
     let (header, rest) = file.split_at_checked(HEADER).ok_or(DAMAGED)?;
     let mut file = Bytes { rest, is_big_endian: header.ends_with(b"MI") };
-    let mut columns = Columns::new();
+    let mut contents = Contents::default();
+    let mut size = 0;
     while !file.rest.is_empty() {
         let (mut kind, mut rest) = element(&mut file)?;
         let mut inflated = Vec::new();
         if kind == COMPRESSED {
-            ZlibDecoder::new(rest).read_to_end(&mut inflated).map_err(|error| error.to_string())?;
+            let limit = LARGEST - size;
+            ZlibDecoder::new(rest).take(limit + 1).read_to_end(&mut inflated).map_err(|error| error.to_string())?;
+            size += inflated.len() as u64;
+            if size > LARGEST {
+                return Err(format!("unpacked, it is larger than {} MiB", LARGEST >> 20));
+            }
             (kind, rest) = element(&mut Bytes { rest: &inflated, ..file })?;
         }
         if kind == ARRAY {
-            columns.extend(column(Bytes { rest, ..file })?);
+            let (name, value) = variable(Bytes { rest, ..file }, 0)?;
+            add("", &name, value, &mut contents);
         }
     }
-    Ok(columns)
+    Ok(contents)
 }

@@ -1,8 +1,8 @@
 //! TDMS files (NI, TDMS File Format Internal Structure): segments, each with the changes of its objects, and their
 //! values.
 
-use super::Columns;
 use super::bytes::{Bytes, DAMAGED};
+use super::{Array, Contents};
 
 /// What a segment has.
 const OBJECTS: u32 = 1 << 1;
@@ -93,8 +93,8 @@ fn read_objects(mut from: Bytes, objects: &mut Vec<Object>, listed: &mut Vec<usi
     Ok(())
 }
 
-/// The columns of a file: its channels.
-pub(super) fn columns(file: &[u8]) -> Result<Columns, String> {
+/// The channels of a file.
+pub(super) fn contents(file: &[u8]) -> Result<Contents, String> {
     let (mut objects, mut listed) = (Vec::<Object>::new(), Vec::new());
     let mut file = Bytes { rest: file, is_big_endian: false };
     while !file.rest.is_empty() {
@@ -138,12 +138,18 @@ pub(super) fn columns(file: &[u8]) -> Result<Columns, String> {
             }
         }
     }
-    // The path of a channel is `/'group'/'channel'`, with quotes in names doubled.
-    let named = |object: Object| {
-        let (_, name) = object.path.rsplit_once("'/'")?;
-        Some((name.trim_end_matches('\'').replace("''", "'"), object.values))
-    };
-    Ok(objects.into_iter().filter_map(named).collect())
+    let mut contents = Contents::default();
+    for Object { path, kind, values, .. } in objects {
+        // The path of a channel is `/'group'/'channel'`, with quotes in names doubled.
+        let Some((group, name)) = path.rsplit_once("'/'") else { continue };
+        let plain = |name: &str| name.trim_start_matches("/'").trim_end_matches('\'').replace("''", "'");
+        let (group, name) = (plain(group), plain(name));
+        match form(kind) {
+            Some(_) => contents.arrays.push(Array { group, name, size: vec![values.len()], values }),
+            None => contents.others.push((name, "no array of numbers".to_owned())),
+        }
+    }
+    Ok(contents)
 }
 
 #[cfg(test)]
@@ -188,10 +194,11 @@ mod tests {
             segment(new | INTERLEAVED | BIG_ENDIAN, &mixed),
         ];
         let expected = [0.0, 1.0, 2.0, 3.0, 0.0, 1.0, 0.0, 1.0, 2.0, 3.0].to_vec();
-        let wanted = Ok(["a", "it's b"].map(|name| (name.to_owned(), expected.clone())).to_vec());
-        assert_eq!(columns(&file.concat()), wanted);
+        let wanted = ["a", "it's b"].map(|name| ("scan".to_owned(), name.to_owned(), expected.clone()));
+        let found = contents(&file.concat()).unwrap().arrays.into_iter();
+        assert_eq!(found.map(|array| (array.group, array.name, array.values)).collect::<Vec<_>>(), wanted);
         let mut other = file.concat();
         other.pop();
-        assert_ne!(columns(&other), wanted);
+        assert!(contents(&other).is_err());
     }
 }

@@ -12,7 +12,7 @@ use crate::everett::EverettTable;
 use crate::findings::Findings;
 use crate::record::{self, Record, later};
 use crate::regressor::Plane;
-use crate::signals::{self, Input};
+use crate::signals::{self, Input, Signals};
 use crate::staircase::Staircase;
 use crate::statistics::{Line, extent, mean, noise_floor, rms_and_max};
 use specgen_language::diagnostic::{Diagnostic, codes};
@@ -38,6 +38,8 @@ pub struct Drive {
     weightless: Vec<bool>,
     /// Half the interval for which a converter holds a command, s; 0 for a measured voltage.
     pub held: f64,
+    /// Findings of its file that refuse nothing.
+    pub warnings: Vec<Diagnostic>,
 }
 
 impl From<&Record> for Drive {
@@ -49,6 +51,7 @@ impl From<&Record> for Drive {
             displacement: Some(record.displacement.clone()),
             weightless: record.weightless.clone(),
             held: record.held(),
+            warnings: Vec::new(),
         }
     }
 }
@@ -58,7 +61,15 @@ impl Drive {
     #[must_use]
     pub fn of_voltage(shown_as: &str, time: Vec<f64>, voltage: Vec<f64>) -> Self {
         let weightless = vec![false; time.len()];
-        Self { shown_as: shown_as.to_owned(), time, drive: voltage, displacement: None, weightless, held: 0.0 }
+        Self {
+            shown_as: shown_as.to_owned(),
+            time,
+            drive: voltage,
+            displacement: None,
+            weightless,
+            held: 0.0,
+            warnings: Vec::new(),
+        }
     }
 }
 
@@ -71,7 +82,8 @@ pub fn read_drive(input: Input, shown_as: &str) -> Result<Drive, Vec<Diagnostic>
     let (time, drive, monitored, displacement) = record::quantities(&mut signals);
     let held = if monitored { 0.0 } else { record::hold(&time) };
     let weightless = vec![false; time.len()];
-    Ok(Drive { shown_as: signals.shown_as, time, drive, displacement, weightless, held })
+    let Signals { shown_as, warnings, .. } = signals;
+    Ok(Drive { shown_as, time, drive, displacement, weightless, held, warnings })
 }
 
 /// Error of a prediction. Lengths in m; percentages are of `range`.

@@ -1,11 +1,12 @@
 //! Assigns the columns of a file: by the user's choice, otherwise by their names.
 
 use super::{ColumnSpec, TIME};
-use crate::columns::names::{self, Quantity};
+use crate::columns::names::{self, Conversion, Quantity};
 use crate::columns::{Column, Head};
 use crate::findings::Findings;
-use crate::reading::Reading;
+use crate::reading::{ColumnChoice, Reading};
 use specgen_language::diagnostic::{Code, codes};
+use specgen_language::shell;
 
 /// Headers within this edit distance of a requested name are suggested.
 const NEAR: usize = 4;
@@ -32,15 +33,20 @@ pub(super) fn find(header: &Head, wanted: &[ColumnSpec], reading: &Reading, find
     }
     let interval = search.interval(findings);
     let mut columns = Vec::new();
+    let mut missing = Vec::new();
     let measured = names.contains(&MONITOR) && matches!(search.place(MONITOR), Ok(Some(_)));
     for w in wanted {
         let counted = w.name == TIME && interval.is_some();
         let found = if counted { search.sample_numbers() } else { search.place(w.name) };
         if matches!(found, Ok(None)) && w.required && !counted && !(w.name == DRIVE && measured) {
-            let message = format!("column `{}` is missing; {}", w.name, search.present());
-            findings.add(codes::RECORD_HEADER, line, message, &search.help(w.name));
+            missing.push(w.name);
         }
         columns.push(found.unwrap_or_else(|(code, message, help)| findings.refuse(code, line, message, help)));
+    }
+    let suggested = search.suggested(&missing, &columns);
+    for name in missing {
+        let message = format!("column `{name}` is missing; {}", search.present());
+        findings.add(codes::RECORD_HEADER, line, message, &search.help(name, suggested.as_deref()));
     }
     if findings.any_error() { None } else { Some(Places { columns, interval }) }
 }
@@ -57,8 +63,8 @@ struct Search<'a> {
 impl Search<'_> {
     /// The column of the quantity `name`, if there is one; two that fit equally well are a problem.
     fn place(&self, name: &'static str) -> Result<Option<Column<'static>>, Problem> {
-        if let Some((column, per)) = self.reading.column(name) {
-            return self.chosen(column, name).map(|at| Some(Column { at, name, per }));
+        if let Some(choice) = self.reading.column(name) {
+            return self.chosen(choice, name).map(Some);
         }
         let Some(quantity) = names::quantity(name) else { return Ok(None) };
         let fits = |(at, header): (usize, &String)| quantity.fits(header).map(|(fit, per)| (fit, at, per));
@@ -69,22 +75,38 @@ impl Search<'_> {
                 let message = format!("column `{name}` appears twice, as columns {} and {}", a + 1, b + 1);
                 Err((codes::RECORD_COLUMN_TWICE, message, "keep one of them"))
             }
-            [(_, at, per), ..] => Ok(Some(Column { at, name, per })),
+            [(_, at, per), ..] => Ok(Some(Column { at, name, conversion: Conversion::unit(per) })),
             [] => Ok(None),
         }
     }
 
-    /// The place of the column that the user named `column`.
-    fn chosen(&self, column: &str, name: &str) -> Result<usize, Problem> {
+    /// The column that the user chose. Its name may look like a number or like a scale.
+    fn chosen(&self, choice: &ColumnChoice, name: &'static str) -> Result<Column<'static>, Problem> {
+        let plain = choice.conversion.and_then(|conversion| Some((self.at(&choice.column)?, conversion)));
+        if let Some((at, conversion)) = plain {
+            return Ok(Column { at, name, conversion });
+        }
+        let scaled = choice.scaled.as_ref().and_then(|scaled| Some((self.at(&scaled.column)?, scaled)));
+        let Some((at, scaled)) = scaled else {
+            let message = format!("`--columns` names `{}` for `{name}`; {}", choice.column, self.present());
+            return Err((codes::RECORD_HEADER, message, "name a column as the file does, or by its number from 1"));
+        };
+        let header = self.header.names.get(at).map_or("", String::as_str);
+        let denominator = scaled.denominator.as_deref().unwrap_or_default();
+        let per = names::per_denominator(header, denominator).map_err(|own| {
+            let message = format!("`--columns` scales `{header}` per {denominator}, but its unit is {own}");
+            (codes::RECORD_HEADER, message, "give the factor per unit of the column")
+        })?;
+        Ok(Column { at, name, conversion: Conversion { per, ..scaled.conversion } })
+    }
+
+    /// The place of the column with this name, or else this number.
+    fn at(&self, column: &str) -> Option<usize> {
         let names = &self.header.names;
         let named = names.iter().position(|header| header.eq_ignore_ascii_case(column));
         let numbered = || column.parse::<usize>().ok().and_then(|number| number.checked_sub(1));
         // In a file without names, any line shows whether it is long enough.
-        let found = named.or_else(|| numbered().filter(|at| names.is_empty() || *at < names.len()));
-        found.ok_or_else(|| {
-            let message = format!("`--columns` names `{column}` for `{name}`; {}", self.present());
-            (codes::RECORD_HEADER, message, "name a column as the file does, or by its number from 1")
-        })
+        named.or_else(|| numbered().filter(|at| names.is_empty() || *at < names.len()))
     }
 
     /// Time between samples, s, if time is computed.
@@ -107,7 +129,7 @@ impl Search<'_> {
     /// The column with sample numbers, if there is one.
     fn sample_numbers(&self) -> Result<Option<Column<'static>>, Problem> {
         let at = match self.reading.sample_column() {
-            Some(column) => Some(self.chosen(column, "sample")?),
+            Some(choice) => Some(self.chosen(choice, "sample")?.at),
             None => self.header.names.iter().position(|name| names::is_sample_number(name)),
         };
         Ok(at.filter(|_| self.reading.rate().is_some()).map(|at| Column::plain(at, "sample")))
@@ -123,43 +145,89 @@ impl Search<'_> {
         }
     }
 
-    /// How to provide the column `name`.
-    fn help(&self, name: &'static str) -> String {
+    /// Options that assign a column to each of the `missing` quantities: one of a similar name, or else the next with
+    /// numbers that is free. None if there are too few.
+    fn suggested(&self, missing: &[&'static str], found: &[Option<Column>]) -> Option<String> {
+        let is_taken = |at: &usize| found.iter().flatten().any(|column| column.at == *at);
+        let is_sample = |at: &usize| self.header.names.get(*at).is_some_and(|name| names::is_sample_number(name));
+        let mut free: Vec<usize> = self.header.filled.clone();
+        free.retain(|at| !is_taken(at) && !is_sample(at));
+        let counts_samples = self.header.names.iter().any(|name| names::is_sample_number(name));
+        let rate = missing.contains(&TIME) && (counts_samples || free.len() < missing.len());
+        let missing: Vec<_> = missing.iter().copied().filter(|name| !(rate && *name == TIME)).collect();
+        let mut places: Vec<Option<usize>> = Vec::new();
+        for &name in &missing {
+            let place = self.near(name).filter(|at| free.contains(at));
+            free.retain(|at| Some(*at) != place);
+            places.push(place);
+        }
+        let mut free = free.into_iter();
+        let entries: Option<Vec<String>> = missing
+            .iter()
+            .zip(places)
+            .map(|(&name, place)| Some(self.entry(name, place.or_else(|| free.next())?)))
+            .collect();
+        let entries = entries?;
+        let kept: Vec<String> = self.reading.given().map(str::to_owned).chain(entries).collect();
+        let columns = shell::quoted(&kept.join(","));
+        let options =
+            [(!kept.is_empty()).then(|| format!("--columns {columns}")), rate.then(|| "--rate HZ".to_owned())];
+        Some(options.into_iter().flatten().collect::<Vec<_>>().join(" ")).filter(|options| !options.is_empty())
+    }
+
+    /// The entry of `--columns` for a quantity in a column. If its unit is not known, a factor of 1 stands for it.
+    fn entry(&self, name: &'static str, at: usize) -> String {
+        let header = self.header.names.get(at);
+        match names::quantity(name).filter(|quantity| header.is_some_and(|header| has_other_unit(header, quantity))) {
+            Some(quantity) => format!("{}={}*1 {}", quantity.plain(), self.word(at), quantity.unit()),
+            None => format!("{name}={}", self.word(at)),
+        }
+    }
+
+    /// How `--columns` names a column: by its header, unless that has a letter with a meaning there or in a message.
+    fn word(&self, at: usize) -> String {
         let names = &self.header.names;
-        let wanted: Vec<&str> = self.wanted.iter().filter(|w| w.required).map(|w| w.name).collect();
-        if names.is_empty() {
-            let columns: Vec<String> = wanted.iter().enumerate().map(|(k, name)| format!("{name}={}", k + 1)).collect();
-            return format!(
-                "the first line must be the header `{}`; or give `--columns {}`",
-                wanted.join(","),
-                columns.join(",")
-            );
-        }
-        if name == TIME && names.iter().any(|name| names::is_sample_number(name)) {
-            return "the file has sample numbers: give `--rate HZ`".to_owned();
-        }
-        let Some(quantity) = names::quantity(name) else { return String::new() };
-        let plain = quantity.plain();
+        let is_plain =
+            |name: &&String| !name.is_empty() && !name.contains(['=', '`', '\'', '\n']) && self.at(name) == Some(at);
+        names.get(at).filter(is_plain).cloned().unwrap_or_else(|| (at + 1).to_string())
+    }
+
+    /// The column whose name is the most similar to `name`, if one is similar.
+    fn near(&self, name: &'static str) -> Option<usize> {
+        let plain = names::quantity(name)?.plain();
         let lower = name.to_ascii_lowercase();
         let taken = |header: &str| {
             self.wanted.iter().any(|w| names::quantity(w.name).is_some_and(|q| q.fits(header).is_some()))
         };
-        let near = names
-            .iter()
-            .filter(|header| !header.is_empty() && !taken(header))
-            .map(|header| (strsim::damerau_levenshtein(&header.to_ascii_lowercase(), &lower), header))
-            .filter(|(distance, header)| *distance < NEAR || header.to_ascii_lowercase().starts_with(plain))
-            .min();
-        match near {
-            Some((_, header)) if has_other_unit(header, quantity) => {
-                format!("the unit of `{header}` is not known: convert it to one of {}", quantity.all_names())
+        let headers = self.header.names.iter().enumerate();
+        headers
+            .filter(|(_, header)| !header.is_empty() && !taken(header))
+            .map(|(at, header)| (strsim::damerau_levenshtein(&header.to_ascii_lowercase(), &lower), at, header))
+            .filter(|(distance, _, header)| *distance < NEAR || header.to_ascii_lowercase().starts_with(plain))
+            .min()
+            .map(|(_, at, _)| at)
+    }
+
+    /// How to provide the column `name`; `suggested` are options that do.
+    fn help(&self, name: &'static str, suggested: Option<&str>) -> String {
+        let names = &self.header.names;
+        let or_give = suggested.map(|options| format!(", or give `{options}`")).unwrap_or_default();
+        if names.is_empty() {
+            let wanted: Vec<&str> = self.wanted.iter().filter(|w| w.required).map(|w| w.name).collect();
+            return format!("the first line must be the header `{}`{or_give}", wanted.join(","));
+        }
+        if name == TIME && names.iter().any(|name| names::is_sample_number(name)) {
+            return format!("the file has sample numbers: give `{}`", suggested.unwrap_or("--rate HZ"));
+        }
+        let Some(quantity) = names::quantity(name) else { return String::new() };
+        match self.near(name).map(|at| &names[at]) {
+            Some(header) if has_other_unit(header, quantity) => {
+                let size = suggested.map(|_| " with the size of its unit in place of 1").unwrap_or_default();
+                let all = quantity.all_names();
+                format!("the unit of `{header}` is not known: convert it to one of {all}{or_give}{size}")
             }
-            Some((_, header)) => {
-                format!("rename `{header}` to `{name}` if that is what it holds, or give `--columns {name}={header}`")
-            }
-            None => format!(
-                "name the column that holds it `{name}`, or give `--columns {name}=COLUMN`; the unit is part of the name"
-            ),
+            Some(header) => format!("rename `{header}` to `{name}` if that is what it holds{or_give}"),
+            None => format!("name the column that holds it `{name}`; the unit is part of the name{or_give}"),
         }
     }
 }
@@ -186,6 +254,25 @@ mod tests {
         ColumnSpec { name: MONITOR, required: false },
         ColumnSpec { name: "displacement_um", required: true },
     ];
+
+    #[test]
+    fn suggestions_assign_every_missing_column() {
+        for (text, options) in [
+            ("tme_s,U,y\n0,1,2\n", "`--columns time_s=tme_s,drive_V=U,displacement_um=y`"),
+            ("Time,s;Ch 1,V;Ch2,V\n0;1;2\n", "`--columns 'drive_V=Ch 1,V,displacement_um=Ch2,V'`"),
+            (",0,1,2\n", "`--columns time_s=2,drive_V=3,displacement_um=4`"),
+            (";a;a;x=1\n7;1;2;3\n", "`--columns time_s=1,drive_V=a,displacement_um=3`"),
+            ("a,b\n1,2\n", "`--columns drive_V=a,displacement_um=b --rate HZ`"),
+            ("sample,a,b\n0,1,2\n", "`--columns drive_V=a,displacement_um=b --rate HZ`"),
+            ("time_s,drive_V,displacement_in\n0,1,2\n", "`--columns 'displacement=displacement_in*1 um'`"),
+        ] {
+            let all = found(text, &Reading::default()).unwrap_err();
+            assert!(all.iter().all(|one| one.contains(options)), "{text}: {all:?}");
+        }
+        let some = Reading::new(&["drive_V=b".to_owned()], None).unwrap();
+        let all = found("a,b,c\n1,2,3\n", &some).unwrap_err();
+        assert!(all[0].contains("--columns drive_V=b,time_s=a,displacement_um=c"), "{all:?}");
+    }
 
     fn found(text: &str, reading: &Reading) -> Result<Vec<Option<usize>>, Vec<String>> {
         let mut findings = Findings::new("r.csv");

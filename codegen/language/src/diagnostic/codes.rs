@@ -235,6 +235,7 @@ codes! {
     RECORD_STEP = "W0520";
     RECORD_HUM = "W0521";
     RECORD_START = "W0522";
+    RECORD_PART = "N0523";
 
     // Identification.
     GRID_NOT_IDENTIFIABLE = "E0601";

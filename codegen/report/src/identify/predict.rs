@@ -52,6 +52,7 @@ fn inertia(options: &Options, model: &RateModel, drive: &Drive) -> Option<Inerti
 pub fn run(options: &Options, bench: &Bench, ui: &mut Ui) -> Result<(), Failure> {
     let shown = options.drive.display().to_string();
     let drive = read_drive(Input::File(&options.drive, &bench.reading), &shown).map_err(refused)?;
+    ui.findings(None, &drive.warnings);
     let mut model = model(&options.model, usize::from(options.leg), ui)?;
     // A spec's dead time counts from the voltage; a command is held before that.
     model.dead_time = options.dead_time.unwrap_or(model.dead_time) + drive.held;

@@ -1,0 +1,161 @@
+//! Files as laboratories have them, made for the tests: read as they are, or refused with what helps.
+
+use super::files::{assert_same, comma, file, read, read_as, rows};
+use super::mat_file::{self as mat, column, doubles, int32, object, structs, subsystem, text};
+use super::*;
+use std::io::Write as _;
+
+fn values(k: usize) -> Vec<f64> {
+    rows().iter().map(|row| row[k]).collect()
+}
+
+fn variables() -> Vec<Vec<u8>> {
+    ["time_s", "drive_V", "displacement_um"].iter().enumerate().map(|(k, name)| column(name, &values(k))).collect()
+}
+
+fn series(list: &str, series: &str) -> Reading {
+    Reading::new(&[list.to_owned()], None).unwrap().of_series(Some(series.to_owned()))
+}
+
+/// The text of the note that the record is a part of its file.
+fn note(record: &Record) -> &str {
+    let found: Vec<_> = record.warnings.iter().filter(|one| one.code == "N0523").collect();
+    assert_eq!(found.len(), 1, "{:?}", record.warnings);
+    &found[0].message
+}
+
+#[test]
+fn structs_of_dspace_are_read() {
+    let x = structs("", &["Name", "Data"], &[vec![text("", "Time"), doubles("", [1, 240], &values(0))]]);
+    let signal = |name: &str, k: usize| vec![text("", name), doubles("", [1, 240], &values(k)), int32("", 1)];
+    let signals = [signal("Model Root/Drive", 1), signal("Model Root/Gauge", 2)];
+    let y = structs("", &["Name", "Data", "XIndex"], &signals);
+    let whole = structs("measured_001", &["X", "Y", "Description"], &[vec![x, y, text("", "nothing")]]);
+    let names = ["drive_V=Model Root/Drive", "displacement_um=Model Root/Gauge"];
+    let record = assert_same("dSPACE", read(&mat::file(&[whole.clone()]), &names, None));
+    assert!(record.warnings.is_empty(), "{:?}", record.warnings);
+    let found = read(&mat::file(&[whole]), &[], None).unwrap_err();
+    assert!(found[0].message.contains("`Model Root/Drive`"), "{found:?}");
+}
+
+#[test]
+fn what_is_no_array_of_numbers_is_left_out_and_named() {
+    let others = [int32("count", 7), text("operator", "nobody"), object("when", "timeseries"), object("why", "string")];
+    let all = [&others[..2], &variables(), &others[2..], &[subsystem()]].concat();
+    let record = assert_same("others", read(&mat::file(&all), &[], None));
+    for word in ["`count` (a number)", "`operator` (a text)", "`when` (an object of class timeseries)", "class string"]
+    {
+        assert!(note(&record).contains(word), "{}", note(&record));
+    }
+    let found = read(&mat::file(&others), &[], None).unwrap_err();
+    assert!(found[0].code == "E0503" && found[0].message.contains("`operator` (a text)"), "{found:?}");
+}
+
+#[test]
+fn a_matrix_and_several_records_are_chosen_by_number_and_name() {
+    let all: Vec<f64> = [2, 0, 1].iter().flat_map(|k| values(*k)).collect();
+    let by_number = &["displacement_um=1", "time_s=2", "drive_V=3"];
+    assert_same("matrix", read(&mat::file(&[doubles("data", [240, 3], &all)]), by_number, None));
+    // No times.
+    let untimed = mat::file(&[column("U", &values(1)), column("y", &values(2))]);
+    assert_same("no times", read(&untimed, &["drive_V=U", "displacement_um=2"], Some(1e3)));
+    let found = read(&untimed, &[], None).unwrap_err();
+    assert!(found[0].help.contains("`--columns drive_V=U,displacement_um=y --rate HZ`"), "{found:?}");
+    // Two records of one length, and a longer one.
+    let other = doubles("other", [240, 3], &all.iter().map(|value| 2.0 * value).collect::<Vec<_>>());
+    let long = doubles("long", [3, 300], &(0..900).map(f64::from).collect::<Vec<_>>());
+    let several = mat::file(&[doubles("first", [240, 3], &all), other, long]);
+    let list = by_number.join(",");
+    for name in ["first", "1"] {
+        let record = assert_same(name, read_as(&several, &series(&list, name)));
+        assert!(record.warnings.is_empty(), "{:?}", record.warnings);
+    }
+    assert_eq!(read_as(&several, &series(&list, "other")).unwrap().drive[7], 2.0 * rows()[7][1]);
+    let found = read_as(&several, &series(&list, "4")).unwrap_err();
+    assert!(found[0].message.contains("3 `long` (300 rows of `long(:,1)`"), "{found:?}");
+    let found = read(&several, &["time_s=1", "drive_V=2", "displacement_um=3"], None).unwrap();
+    assert!(
+        note(&found).contains("table 3 `long`") && note(&found).contains("1 `first` (240 rows"),
+        "{}",
+        note(&found)
+    );
+}
+
+#[test]
+fn numpy_gzip_and_utf_16_are_read() {
+    let plain = file("time_s,drive_V,displacement_um", |[t, u, y]| format!("{t},{u},{y}"));
+    let mut packed = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::fast());
+    packed.write_all(plain.as_bytes()).unwrap();
+    let packed = packed.finish().unwrap();
+    assert_same("gzip", read(&packed, &[], None));
+    let cut = read(&packed[..packed.len() / 2], &[], None).unwrap_err();
+    assert!(cut[0].message.contains("cannot be unpacked"), "{cut:?}");
+    let utf16 = |to: fn(u16) -> [u8; 2]| {
+        ['\u{feff}'.to_string(), plain.clone()].concat().encode_utf16().flat_map(to).collect::<Vec<u8>>()
+    };
+    assert_same("UTF-16, low byte first", read(&utf16(u16::to_le_bytes), &[], None));
+    assert_same("UTF-16, high byte first", read(&utf16(u16::to_be_bytes), &[], None));
+    let npy = |descr: &str, shape: &str, values: &[u8]| {
+        let header = format!("{{'descr': {descr}, 'fortran_order': False, 'shape': {shape}, }}\n");
+        [b"\x93NUMPY\x01\0", &(header.len() as u16).to_le_bytes()[..], header.as_bytes(), values].concat()
+    };
+    let values: Vec<u8> = rows().iter().flatten().flat_map(|value| value.to_le_bytes()).collect();
+    let fields = "[('time_s', '<f8'), ('drive_V', '<f8'), ('displacement_um', '<f8')]";
+    assert_same("fields", read(&npy(fields, "(240,)", &values), &[], None));
+    let columns = npy("'<f8'", "(240, 3)", &values);
+    assert_same("columns", read(&columns, &["time_s=1", "drive_V=2", "displacement_um=3"], None));
+    let found = read(&columns, &[], None).unwrap_err();
+    assert!(found[0].message.contains("`column 1`, `column 2`, `column 3`"), "{found:?}");
+}
+
+#[test]
+fn a_scaled_gauge_is_read() {
+    let volts = file("time_s,drive_V,CH2 (mV),y", |[t, u, y]| format!("{t},{u},{},{y}", 1e3 * (y - 0.3) / 5.0));
+    for scale in ["displacement=CH2 (mV)*5 um/V+0.3 um", "displacement=3*5 um/V+300 nm", "displacement_nm=y*1e3"] {
+        assert_same(scale, read(volts.as_bytes(), &[scale], None));
+    }
+    let found = read(volts.as_bytes(), &["displacement=CH2 (mV)*5 um/N"], None).unwrap_err();
+    assert!(found[0].message.contains("its unit is mv"), "{found:?}");
+}
+
+#[test]
+fn the_data_table_of_a_text_is_found() {
+    let data = file("Time [s];Drive [V];Displacement [um]", |row| row.map(comma).join(";"));
+    let small = "Program 3\n\nR;C;T\n10,5;2;25\n11,5;3;26\n";
+    let before = assert_same("small table", read(format!("{small}\n{data}").as_bytes(), &[], None));
+    assert!(note(&before).contains("1 `Program 3` (2 rows of `R`, `C`, `T` from line 4)"), "{}", note(&before));
+    let run =
+        |first: usize| file("t;U;y", |row| row.map(comma).join(";")).lines().skip(first).collect::<Vec<_>>().join("\n");
+    let short = |first: usize| format!("Run\nt;U;y\n{}\n", run(first));
+    let all = format!("{small}{}{}{}", short(150), short(1), short(100));
+    let list = "time_s=t,drive_V=U,displacement_um=y";
+    let longest = assert_same("longest", read(all.as_bytes(), &[list], None));
+    assert!(note(&longest).contains("table 3 `Run` (240 rows"), "{}", note(&longest));
+    let fourth = read_as(all.as_bytes(), &series(list, "4")).unwrap();
+    assert_eq!((fourth.time.len(), fourth.time[0], fourth.warnings.len()), (141, 0.099, 0));
+}
+
+#[test]
+fn stretches_between_gaps_and_joined_runs_are_records() {
+    let gap =
+        file("time_s,drive_V,displacement_um", |[t, u, y]| format!("{},{u},{y}", if t < 0.1 { t } else { t + 0.05 }));
+    let record = read(gap.as_bytes(), &[], None).unwrap();
+    assert!(record.time.len() == 140 && (record.time[0] - 0.15).abs() < 1e-9, "{}", record.time[0]);
+    assert!(note(&record).contains("0 s to 0.099 s"), "{}", note(&record));
+    let whole = file("time_s,drive_V,displacement_um", |[t, u, y]| format!("{t},{u},{y}"));
+    let joined = whole.clone() + &whole.lines().skip(1).take(150).collect::<Vec<_>>().join("\n");
+    assert!(note(&assert_same("joined", read(joined.as_bytes(), &[], None))).contains("starts again"));
+}
+
+#[test]
+fn curves_without_their_ways_back_are_refused_for_that() {
+    let curve = |k: u32| {
+        (0..20)
+            .map(|i| format!("{:+.4E},{:+.4E}\n", f64::from(i) - f64::from(k), 1e-6 * f64::from(i)))
+            .collect::<String>()
+    };
+    let curves: Vec<String> = (0..12).map(|k| format!("{}\n+2.0E+01,+1.0E-05\n", curve(k))).collect();
+    let text = format!("MicroMag\nNForc = 12\n\n   Field       Moment\n   (Oe)         (emu)\n\n{}", curves.join("\n"));
+    let found = read(text.as_bytes(), &[], None).unwrap_err();
+    assert!(found[0].code == "E0511" && found[0].message.contains("12 curves"), "{found:?}");
+}

@@ -1,0 +1,114 @@
+//! The choice of one table of a file that has several: by the user, otherwise the longest.
+
+use super::findings::Findings;
+use specgen_language::diagnostic::codes;
+
+/// A table of a file.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct Extent {
+    /// Its title, struct or group; may be empty.
+    pub(crate) name: String,
+    /// Number of its samples.
+    pub(crate) rows: usize,
+    /// Names of its columns; empty if it has none.
+    pub(crate) columns: Vec<String>,
+    /// Line of its first sample in a text.
+    pub(crate) first_line: Option<usize>,
+}
+
+/// Most items of a list in a message.
+const LISTED: usize = 8;
+
+/// A list for a message.
+pub(crate) fn listed(items: &[String]) -> String {
+    let more = items.len().saturating_sub(LISTED);
+    let list = items[..items.len() - more].join(", ");
+    if more > 0 { format!("{list} and {more} more") } else { list }
+}
+
+impl Extent {
+    fn in_words(&self, index: usize) -> String {
+        let name = if self.name.is_empty() { String::new() } else { format!(" `{}`", self.name) };
+        let place = self.first_line.map(|line| format!(" from line {line}")).unwrap_or_default();
+        let columns: Vec<String> = self.columns.iter().map(|name| format!("`{name}`")).collect();
+        let of = if columns.is_empty() { String::new() } else { format!(" of {}", listed(&columns)) };
+        let rows = if self.rows == 1 { "row" } else { "rows" };
+        format!("{}{name} ({} {rows}{of}{place})", index + 1, self.rows)
+    }
+}
+
+/// Index of the table that is read: `series`, a name or a number from 1, or else the longest. `is_known`: whether its
+/// names are those of a record. A note has the others, and what was left out. `None` after the problem was reported.
+pub(crate) fn choose(
+    all: &[Extent],
+    is_known: impl Fn(&Extent) -> bool,
+    left_out: &[String],
+    series: Option<&str>,
+    findings: &mut Findings,
+) -> Option<usize> {
+    let words = |but: Option<usize>| -> Vec<String> {
+        let others = all.iter().enumerate().filter(|(index, _)| Some(*index) != but);
+        others.map(|(index, table)| table.in_words(index)).collect()
+    };
+    if let Some(series) = series {
+        let named = all.iter().position(|table| table.name.eq_ignore_ascii_case(series.trim()));
+        let numbered = || series.trim().parse::<usize>().ok()?.checked_sub(1).filter(|index| *index < all.len());
+        return named.or_else(numbered).or_else(|| {
+            let message = format!("`--series` names `{series}`; the file has {}", listed(&words(None)));
+            findings.refuse(codes::RECORD_HEADER, None, message, "name a table of the file by its name or number")
+        });
+    }
+    // The first of equals.
+    let chosen =
+        all.iter().enumerate().rev().max_by_key(|(_, table)| (is_known(table), table.rows)).map(|(index, _)| index)?;
+    let mut parts = Vec::new();
+    if all.len() > 1 {
+        parts.push(format!(
+            "table {} is read; not read: {}",
+            all[chosen].in_words(chosen),
+            listed(&words(Some(chosen)))
+        ));
+    }
+    if !left_out.is_empty() {
+        parts.push(format!("left out: {}", listed(left_out)));
+    }
+    if !parts.is_empty() {
+        let help =
+            if all.len() > 1 { "`--series N` reads another table" } else { "check that the record needs none of them" };
+        findings.add(codes::RECORD_PART, None, parts.join("; "), help);
+    }
+    Some(chosen)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_longest_table_is_read_unless_the_user_names_one() {
+        let table = |name: &str, rows, first_line| Extent {
+            name: name.to_owned(),
+            rows,
+            columns: vec!["a".to_owned()],
+            first_line: Some(first_line),
+        };
+        let all = [table("R, C", 3, 2), table("20 Hz", 500, 8), table("40 Hz", 500, 600)];
+        let choose = |series: Option<&str>| {
+            let mut findings = Findings::new("r.csv");
+            let found = choose(&all, |_| false, &["`s` (a text)".to_owned()], series, &mut findings);
+            (found, findings.into_diagnostics())
+        };
+        let (found, notes) = choose(None);
+        assert_eq!((found, notes[0].code), (Some(1), "N0523"));
+        for word in ["table 2 `20 Hz` (500 rows of `a` from line 8)", "3 `40 Hz`", "left out: `s` (a text)"] {
+            assert!(notes[0].message.contains(word), "{}", notes[0].message);
+        }
+        assert_eq!(choose(Some("3")), (Some(2), Vec::new()));
+        assert_eq!(choose(Some("40 hz")), (Some(2), Vec::new()));
+        let (found, refused) = choose(Some("4"));
+        assert!(
+            found.is_none() && refused[0].code == "E0504" && refused[0].message.contains("1 `R, C`"),
+            "{refused:?}"
+        );
+    }
+}
