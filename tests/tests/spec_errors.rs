@@ -61,7 +61,7 @@ impl Bench {
         match (section.name, key.presence) {
             ("adaptation", _) if key.name.ends_with("_bandwidth") => Choice { weights: false, ..LEGS },
             ("adaptation" | "controller", _) => LEGS,
-            (_, Presence::Form(form)) => Choice { joints: form.contains("one by one"), ..PLATFORM },
+            (_, Presence::Form(forms)) => Choice { form: forms[0], ..PLATFORM },
             ("hysteresis", _) if key.name == "rate_tables" => Choice { dynamic: true, ..PLATFORM },
             ("hysteresis", _) if key.name == "dead_time" => LEGS,
             ("trajectory", _) => Choice {
@@ -234,8 +234,8 @@ fn bad_literals(item: Item) -> Vec<(&'static str, String, Code)> {
             bad.push(("no unit", "3.5".to_owned(), codes::UNIT_MISSING));
             bad.push(("no unit", "\"3\"".to_owned(), codes::UNIT_MISSING));
             bad.push(("wrong unit", "\"3 W\"".to_owned(), codes::WRONG_DIMENSION));
-            bad.push(("unknown unit", "\"3 foot\"".to_owned(), codes::UNKNOWN_UNIT));
-            bad.push(("unknown unit", format!("\"3 foot {unit}\""), codes::UNKNOWN_UNIT));
+            bad.push(("unknown unit", "\"3 furlong\"".to_owned(), codes::UNKNOWN_UNIT));
+            bad.push(("unknown unit", format!("\"3 furlong {unit}\""), codes::UNKNOWN_UNIT));
             bad.push(("no number", format!("\"{unit}\""), codes::BAD_QUANTITY));
             bad.push(("empty", "\"\"".to_owned(), codes::BAD_QUANTITY));
             bad.push(("not finite", "nan".to_owned(), codes::NOT_FINITE));
@@ -374,6 +374,11 @@ fn every_key_may_be_missing_only_if_it_has_a_default() {
                 let (code, about, lines) = (codes::MISSING_KEY, found.key.clone(), String::new());
                 let case = Case { key, path: &path, lines, code, about, what: "missing", bad: "" };
                 bench.offered_by(section, &case, &found.help);
+            }
+            if path == "geometry.joints" {
+                // Without any form, the keys of the first are missing.
+                assert!(errors.len() == 4 && errors.iter().all(|d| d.code == codes::MISSING_KEY), "{findings:#?}");
+                continue;
             }
             if path == "hysteresis.rate" {
                 // What belongs to another value than the default is then refused.

@@ -20,7 +20,7 @@ const TOKENS: &[&str] = &[
     "\\", "\\u0000", "\\ud800", "\\x", "\u{feff}", "\u{b5}m", "\u{3bc}m", "\u{202e}", "\u{10ffff}", "é", "𝛺", "nan",
     "-inf", "1e999", "1e-999", "-0.0", "0x", "0xffffffffffffffff", "9223372036854775808", "1_000", "01",
     "1979-05-27T07:32:00Z", "true", "false", " mm", " kg", "N/(m s)", "N/m s", "^-9", "^99", "((((", "))))", " pi rad",
-    "*", "/", "²", "-", "+", "a.b.c", "geometry", "[target.budget]", "[control]", "[[gauge]]", "[[trajectory]]",
+    "*", "/", "²", "-", "+", " lb/in", "/√Hz", "×10^7", "NMS", "″", " per ", "⁻³", "kgcm", ".", "a.b.c", "geometry", "[target.budget]", "[control]", "[[gauge]]", "[[trajectory]]",
     "kind = \"waveform\"\n", "records/leg1.csv", "..", "/", "[[[[[[[[[[[[[[[[[[[[", "{a={a={a={a={a=",
 ];
 

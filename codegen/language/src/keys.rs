@@ -163,10 +163,18 @@ pub enum Presence {
     Optional,
     /// It is an alternative to another key, which excludes it; whether one is needed depends on the mode.
     InsteadOf(&'static str),
-    /// It belongs to the form of this name: the section has all keys of exactly one form.
-    Form(&'static str),
+    /// It belongs to the forms of these names: the section has all keys of exactly one form.
+    Form(&'static [&'static str]),
     /// This rule, which a check or the building of the model implements.
     Rule(&'static str),
+}
+
+impl Presence {
+    /// The forms that a key belongs to; none if it is not one of several.
+    #[must_use]
+    pub const fn forms(self) -> &'static [&'static str] {
+        if let Self::Form(forms) = self { forms } else { &[] }
+    }
 }
 
 impl Item {
@@ -215,6 +223,27 @@ impl Key {
             Shape::Reasons => "[\"<key>: <reason>\"]".to_owned(),
             Shape::Paths => "[\"<key>\"]".to_owned(),
         }
+    }
+
+    /// The item that `path` names: this key, or one value of its list ("gains.integral\[3\]").
+    #[must_use]
+    pub fn item(&self, path: &str) -> Option<Item> {
+        match self.shape {
+            Shape::One(item) => Some(item),
+            Shape::List(items) | Shape::Rows(_, items) | Shape::Leading(_, items) => {
+                let index =
+                    path.rsplit_once('[').and_then(|(_, rest)| rest.trim_end_matches(']').parse::<usize>().ok());
+                items.get(index.unwrap_or(0)).copied()
+            }
+            Shape::Records | Shape::Reasons | Shape::Paths => None,
+        }
+    }
+
+    /// The template of the key, or of the one item that `path` names.
+    #[must_use]
+    pub fn form(&self, path: &str) -> String {
+        let is_item = path.ends_with(']') || matches!(self.shape, Shape::One(_));
+        self.item(path).filter(|_| is_item).map_or_else(|| self.template(), Item::template)
     }
 
     /// A line of a spec with this key: name and [`Key::template`].
@@ -268,10 +297,9 @@ impl Section {
     #[must_use]
     pub fn forms(&self) -> Vec<&'static str> {
         let mut forms = Vec::new();
-        for key in self.keys {
-            match key.presence {
-                Presence::Form(form) if !forms.contains(&form) => forms.push(form),
-                _ => {}
+        for form in self.keys.iter().flat_map(|key| key.presence.forms()) {
+            if !forms.contains(form) {
+                forms.push(*form);
             }
         }
         forms
@@ -284,8 +312,8 @@ impl Section {
         if !text.is_empty() {
             text.push('\n');
         }
-        let first_form = self.forms().first().map(|form| Presence::Form(form));
-        let needed = |key: &&Key| key.presence == Presence::Required || Some(key.presence) == first_form;
+        let of_first = |key: &Key| self.forms().first().is_some_and(|form| key.presence.forms().contains(form));
+        let needed = |key: &&Key| key.presence == Presence::Required || of_first(key);
         for key in self.keys.iter().filter(needed) {
             text.push_str(&format!("{}\n", key.line()));
         }

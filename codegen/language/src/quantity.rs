@@ -2,21 +2,26 @@
 //!
 //! ```text
 //! quantity = number [unit]            number = ["+"|"-"] decimal ["e" exponent]
-//! unit     = product {"/" factor}     product = factor {[" "|"*"|"·"] factor}
-//! factor   = (name | "(" unit ")") [["^"] power]
+//! unit     = product {"/" factor}     product = factor {[" "|"*"|"·"|"-"] factor}
+//! factor   = (name | "(" unit ")") [["^"|"**"] power]
 //! ```
-//! Conversion to SI is exact up to one rounding. If the unit has a divisor other than a power of ten (`V/min`), the
-//! division rounds a second time.
+//! Conversion to SI rounds once, to the nearest double. A name that is not a symbol may have several meanings ([`names`]):
+//! [`parse`] takes the surest one, [`parse_as`] the one that gives the wanted dimension.
 
 mod decimal;
 mod dimension;
+mod names;
+mod number;
 mod unit_parser;
 mod units;
 
 use std::ops::Range;
 
+use names::Trust;
+
 pub use decimal::Decimal;
 pub use dimension::Dimension;
+pub use units::units_markdown;
 
 /// Longest quantity that is accepted.
 pub const MAX_LENGTH: usize = 120;
@@ -48,10 +53,12 @@ pub enum Problem {
     NoNumber,
     /// A decimal comma, or commas between thousands.
     Comma,
-    /// An unknown unit, and the unit that was probably meant.
-    UnknownUnit(String, Option<&'static str>),
-    /// A product after a slash can be read in two ways.
-    AmbiguousQuotient,
+    /// An unknown unit, and the units that were probably meant.
+    UnknownUnit(String, Vec<String>),
+    /// The unit can be read in these ways: quantities.
+    AmbiguousUnit(Vec<String>),
+    /// A product after a slash can be read in these two ways: quantities.
+    AmbiguousQuotient(Vec<String>),
     /// A power that is not a whole number from -9 to 9.
     BadPower,
     /// Text that does not belong to a quantity, such as a stray slash.
@@ -64,7 +71,7 @@ pub enum Problem {
     Underflow,
 }
 
-/// Units in common use; any other unit of the same dimension is valid, too.
+/// Units in common use, for helps; any other unit of the same dimension is valid, too.
 const COMMON: &[&str] = &[
     "m",
     "mm",
@@ -115,105 +122,131 @@ const COMMON: &[&str] = &[
     "MiB",
 ];
 
-/// The usual units of a dimension, for helps and editors.
+/// Further units that an editor offers.
+const FURTHER: &[&str] = &[
+    "in",
+    "mil",
+    "lb",
+    "oz",
+    "arcsec",
+    "arcmin",
+    "mdeg",
+    "lbf/in",
+    "lbf in/rad",
+    "lbf s/in",
+    "kg cm^2",
+    "kg mm^2",
+    "lb in^2",
+    "in/s",
+    "deg/s",
+];
+
+/// The usual units of a dimension, for helps.
 pub fn common_units(dimension: Dimension) -> impl Iterator<Item = &'static str> {
     COMMON.iter().copied().filter(move |unit| unit_value(unit).is_some_and(|one| one.dimension == dimension))
+}
+
+/// The same and others, for editors.
+pub fn offered_units(dimension: Dimension) -> impl Iterator<Item = &'static str> {
+    let further = FURTHER.iter().copied();
+    common_units(dimension)
+        .chain(further.filter(move |unit| unit_value(unit).is_some_and(|one| one.dimension == dimension)))
 }
 
 /// Reads a quantity. A text without a unit is a quantity without dimension.
 ///
 /// # Errors
-/// The first error, with its place in `text`.
+/// The first error, with its place in `text`; a unit with several meanings.
 pub fn parse(text: &str) -> Result<Quantity, QuantityError> {
+    let found = meanings(text)?;
+    let surest = found.iter().filter(|one| one.trust == found[0].trust);
+    only(text, surest.collect())
+}
+
+/// Reads a quantity of `dimension`: of several meanings of its unit, the one with this dimension, so that "lb/in" is a
+/// stiffness. Without such a meaning, this is [`parse`].
+///
+/// # Errors
+/// As those of [`parse`].
+pub fn parse_as(text: &str, dimension: Dimension) -> Result<Quantity, QuantityError> {
+    let found = meanings(text)?;
+    // Capital letters are not doubted where the unit has a meaning as it is written: "Nm" is no nm.
+    let most = found[0].trust.max(Trust::Spelling);
+    let taken = |one: &&Meaning| one.trust <= most && one.scale.dimension == dimension && one.quantity().is_ok();
+    let mut fitting: Vec<&Meaning> = found.iter().filter(taken).collect();
+    let Some(surest) = fitting.first().map(|one| one.trust) else { return parse(text) };
+    fitting.retain(|one| one.trust == surest);
+    only(text, fitting)
+}
+
+/// The meanings of a quantity that have `dimension`, in symbols and with their values; none if it is not a quantity.
+#[must_use]
+pub fn readings(text: &str, dimension: Dimension) -> Vec<(String, f64)> {
+    let fitting = meanings(text).unwrap_or_default().into_iter().filter(|one| one.scale.dimension == dimension);
+    fitting.filter_map(|one| Some((one.text.trim().to_owned(), one.quantity().ok()?.value))).collect()
+}
+
+/// One meaning of a quantity.
+struct Meaning {
+    trust: Trust,
+    negative: bool,
+    number: Decimal,
+    scale: unit_parser::Scale,
+    /// The whole text, in symbols.
+    text: String,
+    /// Where its unit starts.
+    unit_start: usize,
+}
+
+impl Meaning {
+    fn quantity(&self) -> Result<Quantity, Problem> {
+        let times = |product: Decimal, factor: &Decimal| product.times(factor);
+        let above = self.scale.times.iter().fold(self.number.shifted(self.scale.power_of_ten), times);
+        let below = self.scale.over.iter().fold(Decimal::new("1", 0), times);
+        let value = if self.scale.over.is_empty() { above.to_f64() } else { above.over(&below) };
+        if !value.is_finite() {
+            return Err(Problem::Overflow);
+        }
+        if value == 0.0 && !self.number.is_zero() {
+            return Err(Problem::Underflow);
+        }
+        Ok(Quantity { value: if self.negative { -value } else { value }, dimension: self.scale.dimension })
+    }
+}
+
+/// The meanings of a quantity, the surest first; at least one.
+fn meanings(text: &str) -> Result<Vec<Meaning>, QuantityError> {
     if text.len() > MAX_LENGTH {
         return Err(QuantityError { range: 0..text.len(), problem: Problem::TooLong });
     }
-    let (negative, number, unit_start) = parse_number(text)?;
-    let scale = unit_parser::parse(text, unit_start)?;
+    let (negative, number, unit_start) = number::parse(text)?;
+    let units = unit_parser::parse(text, unit_start)?.into_iter();
+    let meaning = |unit_parser::Reading { trust, scale, text }| Meaning {
+        trust,
+        negative,
+        number: number.clone(),
+        scale,
+        text,
+        unit_start,
+    };
+    Ok(units.map(meaning).collect())
+}
 
-    let mut decimal = number.shifted(scale.power_of_ten);
-    for constant in &scale.times {
-        decimal = decimal.times(constant);
+/// The value of the only meaning; several are an error.
+fn only(text: &str, found: Vec<&Meaning>) -> Result<Quantity, QuantityError> {
+    if let [only] = found.as_slice() {
+        return only.quantity().map_err(|problem| QuantityError { range: 0..text.len(), problem });
     }
-    let mut value = decimal.to_f64();
-    for constant in &scale.over {
-        value /= constant.to_f64();
-    }
-    let everything = 0..text.len();
-    if !value.is_finite() {
-        return Err(QuantityError { range: everything, problem: Problem::Overflow });
-    }
-    if value == 0.0 && !number.is_zero() {
-        return Err(QuantityError { range: everything, problem: Problem::Underflow });
-    }
-    Ok(Quantity { value: if negative { -value } else { value }, dimension: scale.dimension })
+    let start = found.first().map_or(0, |one| one.unit_start);
+    let start = text.len() - text[start..].trim_start().len();
+    let problem = Problem::AmbiguousUnit(found.iter().map(|one| one.text.trim().to_owned()).collect());
+    Err(QuantityError { range: start..text.trim_end().len(), problem })
 }
 
 /// SI value of one `unit` such as "mm" or "N m/rad"; `None` if it is not a unit.
 #[must_use]
 pub fn unit_value(unit: &str) -> Option<Quantity> {
     parse(&format!("1 {unit}")).ok()
-}
-
-/// Sign, magnitude, and where the unit starts.
-fn parse_number(text: &str) -> Result<(bool, Decimal, usize), QuantityError> {
-    let fail = |range: Range<usize>, problem| Err(QuantityError { range, problem });
-    let start = text.len() - text.trim_start().len();
-    let rest = &text[start..];
-    // U+2212 is the minus sign of word processors.
-    let sign_length = match rest.chars().next() {
-        Some(sign @ ('+' | '-' | '\u{2212}')) => sign.len_utf8(),
-        _ => 0,
-    };
-    let negative = sign_length > 0 && !rest.starts_with('+');
-    let digits_start = start + sign_length;
-    let body = &text[digits_start..];
-    let word: String = body.chars().take_while(|c| c.is_alphabetic()).collect();
-    if matches!(word.to_ascii_lowercase().as_str(), "nan" | "inf" | "infinity") {
-        return fail(start..digits_start + word.len(), Problem::NotFinite);
-    }
-
-    let count = |s: &str| s.bytes().take_while(u8::is_ascii_digit).count();
-    let whole = count(body);
-    let mut length = whole;
-    let mut fraction = 0;
-    if body[length..].starts_with('.') {
-        fraction = count(&body[length + 1..]);
-        length += 1 + fraction;
-    }
-    if whole + fraction == 0 {
-        return fail(start..text.len(), Problem::NoNumber);
-    }
-    let mut digits = body[..whole].to_owned();
-    if fraction > 0 {
-        digits.push_str(&body[whole + 1..whole + 1 + fraction]);
-    }
-    if body[length..].starts_with(',') {
-        return fail(digits_start + length..digits_start + length + 1, Problem::Comma);
-    }
-    let (exponent, exponent_length) = parse_exponent(&body[length..]);
-    length += exponent_length;
-    // `fraction` is at most MAX_LENGTH, so that the cast is exact.
-    let decimal = Decimal::new(&digits, exponent.saturating_sub(fraction as i64));
-    Ok((negative, decimal, digits_start + length))
-}
-
-/// Value and length of a leading "e-3"; (0, 0) if the text starts otherwise, as "eV" does.
-fn parse_exponent(text: &str) -> (i64, usize) {
-    let Some(after) = text.strip_prefix(['e', 'E']) else {
-        return (0, 0);
-    };
-    let (sign, digits) = match after.strip_prefix('-') {
-        Some(digits) => (-1, digits),
-        None => (1, after.strip_prefix('+').unwrap_or(after)),
-    };
-    let count = digits.bytes().take_while(u8::is_ascii_digit).count();
-    if count == 0 {
-        return (0, 0);
-    }
-    // Beyond i64 the value overflows or underflows in any case.
-    let magnitude = digits[..count].parse::<i64>().unwrap_or(i64::MAX / 2);
-    (sign * magnitude, text.len() - digits.len() + count)
 }
 
 #[cfg(test)]

@@ -8,6 +8,7 @@
 
 mod check;
 mod findings;
+mod joint_file;
 pub mod keys;
 mod messages;
 mod names;
@@ -15,6 +16,7 @@ mod read;
 mod reference;
 mod schema;
 mod source;
+mod suggestion;
 mod syntax;
 mod text;
 mod value;
@@ -86,7 +88,8 @@ pub fn load_as_far(source: &SpecSource) -> (Option<Model>, Vec<Diagnostic>) {
     if !parsed.whole {
         return (None, findings.finish());
     }
-    let fields = read::read(text, &parsed.root, &mut findings);
+    let mut fields = read::read(text, &parsed.root, &mut findings);
+    joint_file::read(&mut fields, &source.dir, &mut findings);
     check::all(&fields, &source.dir, &mut findings);
     drop_wrong_advice(&mut findings);
     let whole = |finding: &Diagnostic| {

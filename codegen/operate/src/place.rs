@@ -20,8 +20,8 @@ pub(crate) fn named(words: &[&str]) -> Result<AxisValues, String> {
         let axis = AXES.iter().position(|known| *known == name);
         let axis = axis.ok_or_else(|| format!("{}; the axes are {}", expected(), AXES.join(", ")))?;
         let slot = axes.get_mut(axis).ok_or_else(expected)?;
-        let read = quantity::parse(text).map_err(|_| expected())?;
         let (dimension, unit) = if axis < 3 { (Dimension::LENGTH, "um") } else { (Dimension::ANGLE, "urad") };
+        let read = quantity::parse_as(text, dimension).map_err(|_| expected())?;
         // Zero needs no unit.
         let is_zero = read.dimension == Dimension::NONE && read.value == 0.0;
         if read.dimension != dimension && !is_zero {

@@ -16,7 +16,9 @@ use specgen_language::diagnostic::{Diagnostic, Severity};
 use specgen_language::interrupt::Scratch;
 use specgen_language::outcome::{Failure, Outcome, Refusal, environment};
 use specgen_language::shell;
-use specgen_language::spec::{self, SpecSource, json_schema, quantity};
+use specgen_language::spec::keys::{self, Item};
+use specgen_language::spec::quantity::{self, Dimension};
+use specgen_language::spec::{self, SpecSource, json_schema};
 
 use crate::reversal_curves::{Experiment, simulate};
 use draft::{Draft, Origin};
@@ -192,17 +194,21 @@ fn line(open: &[&Question]) -> Result<String, Failure> {
     Ok(line.trim().to_owned())
 }
 
-/// SI values of a literal, one or a list.
-fn values(literal: &str) -> Vec<f64> {
-    let plain = questions::plain(literal);
-    plain.split(',').map(|text| quantity::parse(text.trim()).map_or(0.0, |found| found.value)).collect()
+/// SI values of a key, one or a list.
+fn values(draft: &Draft, key: &str) -> Vec<f64> {
+    let dimension = match keys::key(key).and_then(|known| known.item(key)) {
+        Some(Item::Quantity { dimension, .. }) => dimension,
+        _ => Dimension::NONE,
+    };
+    let plain = questions::plain(&draft.literal(key));
+    plain.split(',').map(|text| quantity::parse_as(text.trim(), dimension).map_or(0.0, |found| found.value)).collect()
 }
 
 /// Computes dependent values that were not given, if their inputs were.
 fn compute(draft: &mut Draft) {
     let known = draft.clone();
-    let value = |key: &str| values(&known.literal(key)).first().copied().unwrap_or(0.0);
-    let volts = values(&draft.literal(VOLTAGE));
+    let value = |key: &str| values(&known, key).first().copied().unwrap_or(0.0);
+    let volts = values(draft, VOLTAGE);
     let span = volts.last().unwrap_or(&0.0) - volts.first().unwrap_or(&0.0);
     let (stroke, mass, stiffness) = (value(STROKE), value(MASS), value(STIFFNESS));
     let [base, platform, height] = GEOMETRY.map(value);

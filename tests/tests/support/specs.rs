@@ -33,6 +33,7 @@ pub fn folder_with_records() -> tempfile::TempDir {
     fs::create_dir_all(dir.path().join("specs")).expect("created");
     fs::create_dir_all(dir.path().join("records")).expect("created");
     fs::create_dir_all(dir.path().join("specs/records")).expect("created");
+    fs::copy(repository().join("specs/features/joints.csv"), dir.path().join("specs/joints.csv")).expect("copied");
     for place in ["records", "specs/records"] {
         for name in ["reference-forc", "leg1", "leg2", "leg3", "leg4", "leg5", "leg6", "leg-mu1"] {
             fs::write(dir.path().join(place).join(format!("{name}.csv")), "").expect("written");
@@ -61,15 +62,17 @@ pub fn is_task_space(section: &Section) -> bool {
         )
 }
 
-/// What a spec with every key leaves out: one of two keys, one of two forms, and what the other kind of spec has.
+const CIRCLES: &str = "joint circles";
+
+/// What a spec with every key leaves out: one of two keys, all forms but one, and what the other kind of spec has.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Choice {
     /// With `[control]` and all that belongs to it.
     pub control: bool,
     /// Weights per run instead of bandwidths; without `[control]` only.
     pub weights: bool,
-    /// Joints one by one instead of joint circles.
-    pub joints: bool,
+    /// The form of the joints.
+    pub form: &'static str,
     /// The first trajectory is a waveform instead of a path of the paper.
     pub waveform: bool,
     /// It is a step.
@@ -80,11 +83,11 @@ pub struct Choice {
 
 /// The task-space controller, with joint circles and a path of the paper.
 pub const PLATFORM: Choice =
-    Choice { control: true, weights: false, joints: false, waveform: false, step: false, dynamic: false };
+    Choice { control: true, weights: false, form: CIRCLES, waveform: false, step: false, dynamic: false };
 
 /// The leg feed-forward, with weights per run.
 pub const LEGS: Choice =
-    Choice { control: false, weights: true, joints: false, waveform: false, step: false, dynamic: false };
+    Choice { control: false, weights: true, form: CIRCLES, waveform: false, step: false, dynamic: false };
 
 impl Choice {
     /// Whether the key stands in the text.
@@ -93,7 +96,7 @@ impl Choice {
         let of_step = matches!(key.name, "to" | "time");
         match (section.name, key.presence) {
             (_, Presence::InsteadOf(_)) => key.name.ends_with("_weight") == self.weights,
-            (_, Presence::Form(form)) => form.contains("one by one") == self.joints,
+            (_, Presence::Form(forms)) => forms.contains(&self.form),
             ("hysteresis", _) if key.name == "rate_tables" => self.dynamic,
             ("hysteresis", _) if key.name.starts_with("creep_") => !self.dynamic,
             ("hysteresis", _) if key.name == "dead_time" => !self.control,

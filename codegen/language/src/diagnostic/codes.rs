@@ -165,6 +165,7 @@ codes! {
     MODE_KEY = "E0349";
     MODE_TWICE = "E0350";
     TOO_MANY_MODES = "E0351";
+    JOINT_FILE = "E0352";
 
     // Stability, reach, set-points, gauges, supervisor.
     UNSTABLE_STATIC = "E0401";

@@ -74,7 +74,7 @@ fn values(key: &Key, before: &str, folder: &Path) -> Vec<Value> {
     };
     match first {
         Item::Quantity { dimension, .. } if quoted => {
-            quantity::common_units(dimension).map(|unit| item(unit, Kind::Unit, unit, "unit")).collect()
+            quantity::offered_units(dimension).map(|unit| item(unit, Kind::Unit, unit, "unit")).collect()
         }
         Item::Choice(words) => words.iter().map(|word| item(word, Kind::Choice, &text(word), "")).collect(),
         Item::Flag => ["true", "false"].map(|word| item(word, Kind::Value, word, "")).to_vec(),

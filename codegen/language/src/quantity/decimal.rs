@@ -50,12 +50,65 @@ impl Decimal {
         Self::new(&digits, self.exponent.saturating_add(other.exponent))
     }
 
+    /// The f64 nearest to the quotient by `divisor`, which is not zero; ties to even.
+    #[must_use]
+    pub fn over(&self, divisor: &Self) -> f64 {
+        let divisor_digits: Vec<u8> = divisor.digits.bytes().map(|b| b - b'0').collect();
+        let mut rest: Vec<u8> = Vec::new();
+        let mut quotient = String::new();
+        let mut taken = 0;
+        while taken < self.digits.len() || (!rest.is_empty() && quotient.len() < QUOTIENT_DIGITS) {
+            let next = self.digits.as_bytes().get(taken).map_or(0, |b| b - b'0');
+            if next > 0 || !rest.is_empty() {
+                rest.push(next);
+            }
+            taken += 1;
+            let mut digit = 0_u8;
+            while is_at_least(&rest, &divisor_digits) {
+                subtract(&mut rest, &divisor_digits);
+                digit += 1;
+            }
+            if digit > 0 || !quotient.is_empty() {
+                quotient.push(char::from(b'0' + digit));
+            }
+        }
+        let shift = self.digits.len() as i64 - taken as i64;
+        let exponent = self.exponent.saturating_sub(divisor.exponent).saturating_add(shift);
+        if rest.is_empty() {
+            return Self::new(&quotient, exponent).to_f64();
+        }
+        // Any digit marks that the quotient goes on.
+        quotient.push('1');
+        Self::new(&quotient, exponent.saturating_sub(1)).to_f64()
+    }
+
     /// The nearest f64 (ties to even); infinite or zero where the range of f64 ends.
     #[must_use]
     pub fn to_f64(&self) -> f64 {
         // The text is a well-formed float by construction, so that the parse cannot fail.
         format!("{}e{}", self.digits, self.exponent).parse().unwrap_or(f64::NAN)
     }
+}
+
+/// No number halfway between two doubles has as many digits, so that these and a mark for the rest decide the rounding.
+const QUOTIENT_DIGITS: usize = 800;
+
+/// Whether one number is at least the other: digits without leading zeros.
+fn is_at_least(a: &[u8], b: &[u8]) -> bool {
+    a.len() > b.len() || (a.len() == b.len() && a >= b)
+}
+
+/// Takes the smaller number `b` from `a`: digits without leading zeros.
+fn subtract(a: &mut Vec<u8>, b: &[u8]) {
+    let offset = a.len() - b.len();
+    let mut borrow = 0;
+    for place in (0..a.len()).rev() {
+        let taken = borrow + place.checked_sub(offset).map_or(0, |place| b[place]);
+        borrow = u8::from(a[place] < taken);
+        a[place] = a[place] + 10 * borrow - taken;
+    }
+    let zeros = a.iter().take_while(|digit| **digit == 0).count();
+    a.drain(..zeros);
 }
 
 #[cfg(test)]
@@ -67,6 +120,19 @@ mod tests {
         let product = Decimal::new("99999999999999999999", -5).times(&Decimal::new("98765432109876543210", 2));
         assert_eq!(product, Decimal::new("9876543210987654320901234567890123456790", -3));
         assert!(Decimal::new("000", 3).times(&Decimal::new("17", 0)).is_zero());
+    }
+
+    #[test]
+    fn quotients_are_the_nearest_doubles() {
+        let over = |a: &str, exponent, b: &str| Decimal::new(a, exponent).over(&Decimal::new(b, 0));
+        for (a, b) in [("1", "3"), ("22", "7"), ("1", "254"), ("9007199254740991", "3"), ("600", "60"), ("0", "7")] {
+            let expected = a.parse::<f64>().expect(a) / b.parse::<f64>().expect(b);
+            assert_eq!(over(a, 0, b).to_bits(), expected.to_bits(), "{a}/{b}");
+        }
+        // 2^53 + 1 is halfway between two doubles, and a third of the third of it a little above that.
+        assert_eq!(over("27021597764222979", 0, "3"), 9_007_199_254_740_992.0);
+        assert_eq!(over("27021597764222980", 0, "3"), 9_007_199_254_740_994.0);
+        assert_eq!(over("1", 400, "3"), f64::INFINITY);
     }
 
     #[test]

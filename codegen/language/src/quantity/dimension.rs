@@ -1,15 +1,15 @@
 //! Physical dimensions: exponents of the base units, and the names that messages use.
 
-/// Exponents of m, kg, s, V, rad and byte.
+/// Exponents of m, kg, s, V, rad, byte and √Hz.
 ///
 /// Volt is the electrical base unit. Radian is a dimension of its own, so that a torque is not taken for a rotational
-/// stiffness, nor hertz for rad/s.
+/// stiffness, nor hertz for rad/s. So is √Hz, which occurs in noise densities only.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Dimension {
-    exponents: [i8; 6],
+    exponents: [i8; 7],
 }
 
-const SYMBOLS: [&str; 6] = ["m", "kg", "s", "V", "rad", "B"];
+const SYMBOLS: [&str; 7] = ["m", "kg", "s", "V", "rad", "B", "√Hz"];
 
 impl Dimension {
     /// No dimension.
@@ -55,6 +55,8 @@ impl Dimension {
     /// N m s/rad
     pub const TURN_DAMPING: Self = Self::new([2, 1, -1, 0, -1, 0]);
 
+    /// √Hz
+    pub const ROOT_HERTZ: Self = Self { exponents: [0, 0, 0, 0, 0, 0, 1] };
     /// m/s
     pub const SPEED: Self = Self::new([1, 0, -1, 0, 0, 0]);
     /// m/s²
@@ -69,7 +71,8 @@ impl Dimension {
     /// From the exponents of m, kg, s, V, rad, byte.
     #[must_use]
     pub const fn new(exponents: [i8; 6]) -> Self {
-        Self { exponents }
+        let [m, kg, s, volt, rad, byte] = exponents;
+        Self { exponents: [m, kg, s, volt, rad, byte, 0] }
     }
 
     /// The product with `other` to the power `power`; `None` if an exponent leaves the range of `i8`.
@@ -85,8 +88,20 @@ impl Dimension {
     /// The same with radians left out.
     #[must_use]
     pub const fn without_angle(self) -> Self {
-        let [m, kg, s, volt, _, byte] = self.exponents;
-        Self::new([m, kg, s, volt, 0, byte])
+        let [m, kg, s, volt, _, byte, root] = self.exponents;
+        Self { exponents: [m, kg, s, volt, 0, byte, root] }
+    }
+
+    /// Whether it contains a mass, as a force does.
+    #[must_use]
+    pub const fn contains_mass(self) -> bool {
+        self.exponents[1] == 1
+    }
+
+    /// Whether this is a spectral density of `of`: "nm/√Hz" of a length.
+    #[must_use]
+    pub fn is_density_of(self, of: Self) -> bool {
+        self.times(Self::ROOT_HERTZ, 1) == Some(of)
     }
 
     /// With article, for messages: "a length"; dimensions without a name of their own are spelt in base units.
@@ -95,13 +110,18 @@ impl Dimension {
         NAMES
             .iter()
             .find(|(dimension, _)| *dimension == self)
-            .map_or_else(|| format!("a quantity in {}", self.in_base_units()), |(_, name)| (*name).to_owned())
+            .map(|(_, name)| (*name).to_owned())
+            .or_else(|| {
+                let of = self.times(Self::ROOT_HERTZ, 1).filter(|_| self.exponents[6] == -1)?;
+                Some(format!("the noise density of {}", of.describe()))
+            })
+            .unwrap_or_else(|| format!("a quantity in {}", self.in_base_units()))
     }
 
     /// The dimension in base units: "kg m^2 s^-2".
     #[must_use]
     pub fn in_base_units(self) -> String {
-        let factors: Vec<String> = [1, 0, 2, 3, 4, 5]
+        let factors: Vec<String> = [1, 0, 2, 3, 4, 5, 6]
             .into_iter()
             .filter(|i| self.exponents[*i] != 0)
             .map(|i| match self.exponents[i] {

@@ -1,9 +1,12 @@
-//! The units that a quantity may be written in.
+//! The units that a quantity may be written in, by symbol; [`super::names`] reads their other spellings.
+
+use std::fmt::Write as _;
+use std::sync::LazyLock;
 
 use super::decimal::Decimal;
 use super::dimension::Dimension;
 
-/// A factor of a unit other than a power of ten, to 60 digits: ASCII digits · 10^exponent.
+/// A factor of a unit other than a power of ten, exact or to 60 digits: ASCII digits · 10^exponent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Constant {
     digits: &'static str,
@@ -18,7 +21,11 @@ impl Constant {
     }
 }
 
-/// One unit name with its prefix resolved.
+const fn constant(digits: &'static str, exponent: i64) -> Option<Constant> {
+    Some(Constant { digits, exponent })
+}
+
+/// One unit with its prefix resolved.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Unit {
     /// What it measures.
@@ -27,6 +34,8 @@ pub struct Unit {
     pub power_of_ten: i32,
     /// The rest of its factor to SI, if that is not 1.
     pub constant: Option<Constant>,
+    /// A divisor of its factor to SI, if it has one.
+    pub over: Option<Constant>,
 }
 
 /// The prefixes that a unit takes.
@@ -34,44 +43,87 @@ pub struct Unit {
 enum Prefixes {
     None,
     Si,
+    Micro,
     Memory,
 }
 
 struct Entry {
     names: &'static [&'static str],
-    dimension: Dimension,
-    power_of_ten: i32,
-    constant: Option<Constant>,
+    unit: Unit,
     prefixes: Prefixes,
+    /// Its value in SI units, for the reference; empty if the unit belongs to SI.
+    is: &'static str,
 }
 
-const fn entry(names: &'static [&'static str], dimension: Dimension, power_of_ten: i32) -> Entry {
-    Entry { names, dimension, power_of_ten, constant: None, prefixes: Prefixes::Si }
+const fn si(names: &'static [&'static str], dimension: Dimension, power_of_ten: i32) -> Entry {
+    let unit = Unit { dimension, power_of_ten, constant: None, over: None };
+    Entry { names, unit, prefixes: Prefixes::Si, is: "" }
 }
 
-const fn scaled(names: &'static [&'static str], dimension: Dimension, digits: &'static str, exponent: i64) -> Entry {
-    Entry { names, dimension, power_of_ten: 0, constant: Some(Constant { digits, exponent }), prefixes: Prefixes::None }
+const fn other(
+    names: &'static [&'static str],
+    dimension: Dimension,
+    factor: Option<Constant>,
+    is: &'static str,
+) -> Entry {
+    let unit = Unit { dimension, power_of_ten: 0, constant: factor, over: None };
+    Entry { names, unit, prefixes: Prefixes::None, is }
 }
 
+const fn with(prefixes: Prefixes, entry: Entry) -> Entry {
+    Entry { prefixes, ..entry }
+}
+
+/// 1/s
+pub(super) const HERTZ: Unit = Unit { dimension: Dimension::FREQUENCY, power_of_ten: 0, constant: None, over: None };
+/// The unit under a noise density.
+pub(super) const ROOT_HERTZ: Unit = Unit { dimension: Dimension::ROOT_HERTZ, ..HERTZ };
+
+const PI: Option<Constant> = constant("314159265358979323846264338327950288419716939937510582097494", -59);
+const DEGREE: Option<Constant> = constant("174532925199432957692369076848861271344287188854172545609719", -61);
+const ARCMIN: Option<Constant> = constant("290888208665721596153948461414768785573811981423620909349532", -63);
+const ARCSEC: Option<Constant> = constant("484813681109535993589914102357947975956353302372701515582553", -65);
+const POUND_FORCE: Option<Constant> = constant("44482216152605", -13);
+
+/// lbf s²/ft.
+const SLUG: Entry = Entry {
+    names: &["slug"],
+    unit: Unit { dimension: Dimension::MASS, power_of_ten: 0, constant: POUND_FORCE, over: constant("3048", -4) },
+    prefixes: Prefixes::None,
+    is: "4.4482216152605/0.3048 kg",
+};
+
+/// Inch, pound and pound-force are exact by the agreement of 1959 and standard gravity, 9.80665 m/s².
 const UNITS: &[Entry] = &[
-    entry(&["m"], Dimension::LENGTH, 0),
-    entry(&["g"], Dimension::MASS, -3),
-    entry(&["s"], Dimension::TIME, 0),
-    entry(&["V"], Dimension::VOLTAGE, 0),
-    entry(&["N"], Dimension::FORCE, 0),
-    entry(&["A"], Dimension::CURRENT, 0),
-    entry(&["F"], Dimension::CAPACITANCE, 0),
-    entry(&["Hz"], Dimension::FREQUENCY, 0),
-    entry(&["rad"], Dimension::ANGLE, 0),
-    entry(&["Pa"], Dimension::new([-1, 1, -2, 0, 0, 0]), 0),
-    entry(&["J"], Dimension::new([2, 1, -2, 0, 0, 0]), 0),
-    entry(&["W"], Dimension::new([2, 1, -3, 0, 0, 0]), 0),
-    Entry { names: &["B"], dimension: Dimension::MEMORY, power_of_ten: 0, constant: None, prefixes: Prefixes::Memory },
-    scaled(&["min"], Dimension::TIME, "60", 0),
-    scaled(&["pi", "π"], Dimension::NONE, "314159265358979323846264338327950288419716939937510582097494", -59),
-    scaled(&["deg", "°"], Dimension::ANGLE, "174532925199432957692369076848861271344287188854172545609719", -61),
-    scaled(&["arcmin"], Dimension::ANGLE, "290888208665721596153948461414768785573811981423620909349532", -63),
-    scaled(&["arcsec"], Dimension::ANGLE, "484813681109535993589914102357947975956353302372701515582553", -65),
+    si(&["m"], Dimension::LENGTH, 0),
+    si(&["g"], Dimension::MASS, -3),
+    si(&["s"], Dimension::TIME, 0),
+    si(&["V"], Dimension::VOLTAGE, 0),
+    si(&["N"], Dimension::FORCE, 0),
+    si(&["A"], Dimension::CURRENT, 0),
+    si(&["F"], Dimension::CAPACITANCE, 0),
+    si(&["Hz"], Dimension::FREQUENCY, 0),
+    si(&["rad"], Dimension::ANGLE, 0),
+    si(&["Pa"], Dimension::new([-1, 1, -2, 0, 0, 0]), 0),
+    si(&["J"], Dimension::new([2, 1, -2, 0, 0, 0]), 0),
+    si(&["W"], Dimension::new([2, 1, -3, 0, 0, 0]), 0),
+    with(Prefixes::Si, other(&["deg", "°"], Dimension::ANGLE, DEGREE, "pi/180 rad")),
+    with(Prefixes::Memory, other(&["B"], Dimension::MEMORY, None, "")),
+    other(&["√Hz"], Dimension::ROOT_HERTZ, None, ""),
+    other(&["min"], Dimension::TIME, constant("60", 0), "60 s"),
+    other(&["pi", "π"], Dimension::NONE, PI, ""),
+    other(&["arcmin"], Dimension::ANGLE, ARCMIN, "1/60 deg"),
+    other(&["arcsec"], Dimension::ANGLE, ARCSEC, "1/3600 deg"),
+    with(Prefixes::Micro, other(&["in"], Dimension::LENGTH, constant("254", -4), "25.4 mm")),
+    other(&["ft"], Dimension::LENGTH, constant("3048", -4), "304.8 mm"),
+    other(&["mil", "thou"], Dimension::LENGTH, constant("254", -7), "25.4 um"),
+    other(&["lb"], Dimension::MASS, constant("45359237", -8), "0.45359237 kg"),
+    other(&["oz"], Dimension::MASS, constant("28349523125", -12), "28.349523125 g"),
+    SLUG,
+    other(&["lbf"], Dimension::FORCE, POUND_FORCE, "4.4482216152605 N"),
+    other(&["ozf"], Dimension::FORCE, constant("27801385095378125", -17), "0.27801385095378125 N"),
+    other(&["kgf"], Dimension::FORCE, constant("980665", -5), "9.80665 N"),
+    other(&["gf"], Dimension::FORCE, constant("980665", -8), "9.80665 mN"),
 ];
 
 /// Micro is accepted as ASCII u, micro sign U+00B5 and Greek mu U+03BC.
@@ -91,88 +143,106 @@ const SI_PREFIXES: &[(&str, i32)] = &[
     ("T", 12),
 ];
 
-const BINARY_PREFIXES: &[(&str, Constant)] = &[
-    ("Ki", Constant { digits: "1024", exponent: 0 }),
-    ("Mi", Constant { digits: "1048576", exponent: 0 }),
-    ("Gi", Constant { digits: "1073741824", exponent: 0 }),
-];
+const BINARY_PREFIXES: &[(&str, Option<Constant>)] =
+    &[("Ki", constant("1024", 0)), ("Mi", constant("1048576", 0)), ("Gi", constant("1073741824", 0))];
 
-/// Other words for a unit, and the unit.
-const ALIASES: &[(&str, &str)] = &[
-    ("sec", "s"),
-    ("second", "s"),
-    ("seconds", "s"),
-    ("msec", "ms"),
-    ("usec", "us"),
-    ("micron", "um"),
-    ("microns", "um"),
-    ("meter", "m"),
-    ("metre", "m"),
-    ("volt", "V"),
-    ("volts", "V"),
-    ("newton", "N"),
-    ("hertz", "Hz"),
-    ("rads", "rad"),
-    ("radian", "rad"),
-    ("radians", "rad"),
-    ("degree", "deg"),
-    ("degrees", "deg"),
-    ("gram", "g"),
-    ("byte", "B"),
-    ("bytes", "B"),
-    ("kb", "kB"),
-    ("mb", "MB"),
-];
+/// A unit with or without prefix.
+struct Symbol {
+    prefix: &'static str,
+    text: String,
+    /// In small letters.
+    lower: String,
+    unit: Unit,
+}
 
-/// Every prefix with an SI unit that engineers use here, for suggestions.
-const COMMON: &[&str] = &[
-    "m", "mm", "um", "nm", "g", "kg", "mg", "s", "ms", "us", "ns", "V", "mV", "kV", "N", "mN", "kN", "Hz", "kHz",
-    "MHz", "rad", "mrad", "urad", "nrad", "deg", "B", "kB", "MB", "KiB", "MiB",
-];
-
-/// The unit called `name`, with its prefix resolved.
-#[must_use]
-pub fn find(name: &str) -> Option<Unit> {
-    let bare = |e: &Entry| Unit { dimension: e.dimension, power_of_ten: e.power_of_ten, constant: e.constant };
-    if let Some(found) = UNITS.iter().find(|e| e.names.contains(&name)) {
-        return Some(bare(found));
+impl Symbol {
+    fn new(prefix: &'static str, name: &str, unit: Unit) -> Self {
+        let text = format!("{prefix}{name}");
+        Self { prefix, lower: text.to_lowercase(), text, unit }
     }
-    for e in UNITS.iter().filter(|e| e.prefixes != Prefixes::None) {
-        for unit_name in e.names {
-            let Some(prefix) = name.strip_suffix(unit_name) else {
-                continue;
-            };
-            if e.prefixes == Prefixes::Memory
-                && let Some((_, constant)) = BINARY_PREFIXES.iter().find(|(p, _)| *p == prefix)
-            {
-                return Some(Unit { constant: Some(*constant), ..bare(e) });
+}
+
+/// Every unit that can be written, each text once.
+static SYMBOLS: LazyLock<Vec<Symbol>> = LazyLock::new(|| {
+    let mut symbols = Vec::new();
+    for entry in UNITS {
+        for name in entry.names {
+            symbols.push(Symbol::new("", name, entry.unit));
+            for (prefix, power) in SI_PREFIXES.iter().filter(|(_, power)| entry.takes(*power)) {
+                let unit = Unit { power_of_ten: entry.unit.power_of_ten + power, ..entry.unit };
+                symbols.push(Symbol::new(prefix, name, unit));
             }
-            if let Some((_, power)) = SI_PREFIXES.iter().find(|(p, _)| *p == prefix) {
-                // A fraction of a byte has no meaning.
-                if e.prefixes == Prefixes::Memory && *power < 3 {
-                    continue;
-                }
-                return Some(Unit { power_of_ten: e.power_of_ten + power, ..bare(e) });
+            for (prefix, constant) in BINARY_PREFIXES.iter().filter(|_| entry.prefixes == Prefixes::Memory) {
+                symbols.push(Symbol::new(prefix, name, Unit { constant: *constant, ..entry.unit }));
             }
         }
     }
-    None
+    symbols
+});
+
+impl Entry {
+    /// Whether it takes the SI prefix of this power of ten.
+    fn takes(&self, power: i32) -> bool {
+        match self.prefixes {
+            Prefixes::None => false,
+            Prefixes::Si => true,
+            Prefixes::Micro => power == -6,
+            // A fraction of a byte has no meaning.
+            Prefixes::Memory => power >= 3,
+        }
+    }
 }
 
-/// The unit that was probably meant by an unknown one.
+/// The unit with the symbol `name`, with its prefix resolved.
 #[must_use]
-pub fn suggest(name: &str) -> Option<&'static str> {
+pub fn find(name: &str) -> Option<Unit> {
+    SYMBOLS.iter().find(|symbol| symbol.text == name).map(|symbol| symbol.unit)
+}
+
+/// Symbols that are `name` but for capital letters, with their units; each unit once.
+pub(super) fn regardless_of_case(name: &str) -> Vec<(String, Unit)> {
     let lower = name.to_lowercase();
-    ALIASES
-        .iter()
-        .find(|(alias, _)| *alias == lower)
-        .map(|(_, unit)| *unit)
-        .or_else(|| COMMON.iter().find(|unit| unit.to_lowercase() == lower).copied())
+    let mut found: Vec<&Symbol> = Vec::new();
+    for symbol in SYMBOLS.iter().filter(|symbol| symbol.lower == lower) {
+        if found.iter().all(|known| known.unit != symbol.unit) {
+            found.push(symbol);
+        }
+    }
+    // "Mhz" has its prefix as written; "mhz" and "MHZ" do not.
+    let is_mixed = name != lower && name != name.to_uppercase();
+    let as_written = |symbol: &&Symbol| !symbol.prefix.is_empty() && name.starts_with(symbol.prefix);
+    if is_mixed && found.iter().any(as_written) {
+        found.retain(as_written);
+    }
+    found.into_iter().map(|symbol| (symbol.text.clone(), symbol.unit)).collect()
+}
+
+/// The units as a sentence for the reference.
+#[must_use]
+pub fn units_markdown() -> String {
+    let names = |takes: fn(&Entry) -> bool| {
+        let each = UNITS.iter().filter(move |entry| takes(entry)).map(|entry| {
+            let mut text = entry.names.join(" or ");
+            if !entry.is.is_empty() {
+                // Writing to a String cannot fail.
+                let _ = write!(text, " ({})", entry.is);
+            }
+            text
+        });
+        each.collect::<Vec<_>>().join(", ")
+    };
+    format!(
+        "Units with the prefixes f p n u (also µ) m c d k M G T are {}. B takes k M G T and Ki Mi Gi. \
+         Without prefix there are {}.",
+        names(|entry| entry.prefixes == Prefixes::Si),
+        names(|entry| matches!(entry.prefixes, Prefixes::None | Prefixes::Micro)),
+    )
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::quantity;
 
     #[test]
     fn angle_constants_agree_with_pi() {
@@ -185,12 +255,39 @@ mod tests {
     }
 
     #[test]
-    fn suggestions_are_units() {
-        for (_, unit) in ALIASES {
-            assert!(find(unit).is_some(), "{unit}");
+    fn every_unit_is_worth_what_the_reference_says() {
+        let mut count = 0;
+        // Those with a quotient, such as a degree, have tests of their own.
+        for entry in UNITS.iter().filter(|entry| !entry.is.is_empty() && !entry.is.contains('/')) {
+            for name in entry.names {
+                count += 1;
+                assert_eq!(quantity::parse(&format!("1 {name}")), quantity::parse(entry.is), "{name}");
+            }
         }
-        for unit in COMMON {
-            assert!(find(unit).is_some(), "{unit}");
+        assert!(count >= 12, "{count} units");
+        for (number, expected) in [("1 in", 0.0254), ("1 lb", 0.453_592_37), ("1 lbf", 4.448_221_615_260_5)] {
+            assert_eq!(
+                quantity::parse(number).map(|found| found.value.to_bits()),
+                Ok(f64::to_bits(expected)),
+                "{number}"
+            );
+        }
+    }
+
+    #[test]
+    fn every_unit_is_on_the_page_of_unknown_units() {
+        let page = crate::diagnostic::codes::UNKNOWN_UNIT.page();
+        let words: Vec<&str> = page.split(|c: char| c.is_whitespace() || ",;().".contains(c)).collect();
+        for name in UNITS.iter().flat_map(|entry| entry.names) {
+            assert!(words.contains(name) && units_markdown().contains(name), "{name}");
+        }
+    }
+
+    #[test]
+    fn no_two_units_are_written_alike() {
+        for symbol in SYMBOLS.iter() {
+            let alike: Vec<Unit> = SYMBOLS.iter().filter(|other| other.text == symbol.text).map(|s| s.unit).collect();
+            assert_eq!(alike, [symbol.unit], "{}", symbol.text);
         }
     }
 

@@ -2,10 +2,10 @@
 
 use toml::de::DeValue;
 
-use super::keys::{Item, Key, Range, Shape};
-use super::text;
+use super::keys::{Item, Key, Range};
+use super::{suggestion, text};
 use crate::diagnostic::{Code, codes};
-use crate::quantity::{self, Dimension, Problem};
+use crate::quantity::{self, Problem};
 
 /// "a number", "a text" and so on, with article.
 pub(super) fn kind_of(value: &DeValue<'_>) -> &'static str {
@@ -20,20 +20,12 @@ pub(super) fn kind_of(value: &DeValue<'_>) -> &'static str {
     }
 }
 
-/// The form of the key, or of the one item that `path` names ("gains.integral\[3\]"), with a placeholder for the value.
-pub(super) fn template_of(key: &Key, path: &str) -> String {
-    let is_item = path.ends_with(']');
-    item_of(key, path)
-        .filter(|_| is_item || matches!(key.shape, Shape::One(_)))
-        .map_or_else(|| key.template(), Item::template)
-}
-
 /// What replaces `placeholder`.
 pub(super) fn wanted(key: &Key, path: &str, placeholder: &str) -> String {
     if placeholder == "<unit>" {
         return units_of(key, path).unwrap_or_else(|| "a unit".to_owned());
     }
-    match item_of(key, path) {
+    match key.item(path) {
         Some(item @ (Item::Quantity { .. } | Item::Number(_))) => format!("a number of your own: {}", range_of(item)),
         Some(item @ Item::Integer(..)) => format!("a whole number: {}", range_of(item)),
         Some(item @ (Item::Choice(_) | Item::Flag)) => range_of(item),
@@ -49,18 +41,6 @@ pub(super) fn beside_the_spec(found: &str) -> String {
     let name = found.rsplit(['/', '\\', ':']).next().unwrap_or_default().trim();
     let name = if name.is_empty() { "<file>" } else { name };
     format!("put the file beside the spec and name it \"{}\"", text::shorten(name))
-}
-
-/// The item that `path` names.
-fn item_of(key: &Key, path: &str) -> Option<Item> {
-    match key.shape {
-        Shape::One(item) => Some(item),
-        Shape::List(items) | Shape::Rows(_, items) | Shape::Leading(_, items) => {
-            let index = path.rsplit_once('[').and_then(|(_, rest)| rest.trim_end_matches(']').parse::<usize>().ok());
-            items.get(index.unwrap_or(0)).copied()
-        }
-        Shape::Records | Shape::Reasons | Shape::Paths => None,
-    }
 }
 
 /// "1 mm to 10000 mm" in the unit of the item.
@@ -94,13 +74,13 @@ fn bounds(range: Range, scale: f64, unit: &str) -> String {
 }
 
 pub(super) fn range_help(key: &Key, path: &str) -> String {
-    let range = item_of(key, path).map_or_else(String::new, |item| format!(": {}", range_of(item)));
+    let range = key.item(path).map_or_else(String::new, |item| format!(": {}", range_of(item)));
     format!("give a value in range{range}. {}", key.doc)
 }
 
 /// The usual units of the item that `path` names, for a help: "kg or g".
 pub(super) fn units_of(key: &Key, path: &str) -> Option<String> {
-    let Some(Item::Quantity { dimension, unit, .. }) = item_of(key, path) else { return None };
+    let Some(Item::Quantity { dimension, unit, .. }) = key.item(path) else { return None };
     let mut units: Vec<&str> = quantity::common_units(dimension).collect();
     if !units.contains(&unit) {
         units.insert(0, unit);
@@ -110,77 +90,6 @@ pub(super) fn units_of(key: &Key, path: &str) -> Option<String> {
         [first @ .., last] => Some(format!("{} or {last}", first.join(", "))),
         [] => None,
     }
-}
-
-/// The time that corresponds to a rate, if the key takes a time: the period of "20 kHz" is "50 us". For a lag, the rate
-/// is its corner frequency.
-pub(super) fn time_of_rate(key: &Key, found: &str) -> Option<String> {
-    let Shape::One(Item::Quantity { dimension: Dimension::TIME, unit, range }) = key.shape else { return None };
-    let rate = quantity::parse(found).ok().filter(|rate| rate.dimension == Dimension::FREQUENCY)?;
-    let turn = match key.name {
-        "period" => 1.0,
-        "lag" => std::f64::consts::TAU,
-        _ => return None,
-    };
-    let time = 1.0 / (turn * rate.value);
-    let scale = quantity::unit_value(unit).map_or(1.0, |one| one.value);
-    range.contains(time).then(|| format!("{} {unit}", text::digits(time / scale)))
-}
-
-/// Message and help for a unit that measures something else.
-pub(super) fn wrong_dimension(
-    key: &Key,
-    path: &str,
-    found: &str,
-    is: Dimension,
-    wanted: Dimension,
-) -> (String, String) {
-    let message =
-        format!("`{path}` is \"{}\": this is {}, expected {}", text::shorten(found), is.describe(), wanted.describe());
-    if let Some(time) = time_of_rate(key, found) {
-        return (message, format!("{found} is a {} of \"{time}\"", key.name));
-    }
-    let own =
-        if is.without_angle() == wanted.without_angle() { with_angle(key, path, found, is, wanted) } else { None };
-    if let Some((own, other)) = own.as_ref().zip(hertz_for_rate(key, path, found, is, wanted)) {
-        let help = format!("the unit contains an angle: write \"{own}\", or \"{other}\" if that was intended");
-        return (message, help);
-    }
-    let written = own.map_or_else(|| format!("in the form {}", template_of(key, path)), |own| format!("as \"{own}\""));
-    let hint = if is == Dimension::FREQUENCY && wanted == Dimension::ANGULAR_RATE {
-        "1 Hz is 2 pi rad/s; "
-    } else if is.without_angle() != wanted.without_angle() {
-        ""
-    } else if is == is.without_angle() {
-        "the unit needs an angle; "
-    } else {
-        "the unit contains an angle; "
-    };
-    (message, format!("{hint}write {} {written}", wanted.describe()))
-}
-
-/// The value in the key's unit, if the two differ only by an angle: 20 Hz is 40 pi rad/s, 5 N m is 5 N m/rad.
-fn with_angle(key: &Key, path: &str, found: &str, is: Dimension, wanted: Dimension) -> Option<String> {
-    let Some(Item::Quantity { unit, range, .. }) = item_of(key, path) else { return None };
-    let value = quantity::parse(found).ok()?.value;
-    let turns = |a, b| is == a && wanted == b && found.contains("Hz") != (is == Dimension::ANGULAR_RATE);
-    let (value, text) = if turns(Dimension::FREQUENCY, Dimension::ANGULAR_RATE) {
-        (std::f64::consts::TAU * value, format!("{} pi rad/s", text::digits(2.0 * value)))
-    } else if turns(Dimension::ANGULAR_RATE, Dimension::FREQUENCY) {
-        let turns = value / std::f64::consts::TAU;
-        (turns, format!("{} Hz", text::digits(turns)))
-    } else {
-        (value, format!("{} {unit}", text::digits(value / quantity::unit_value(unit)?.value)))
-    };
-    range.contains(value).then_some(text)
-}
-
-/// The same number in Hz, for a frequency written in rad/s: the likelier mistake.
-fn hertz_for_rate(key: &Key, path: &str, found: &str, is: Dimension, wanted: Dimension) -> Option<String> {
-    let Some(Item::Quantity { range, .. }) = item_of(key, path) else { return None };
-    let value = quantity::parse(found).ok()?.value;
-    let meant = is == Dimension::ANGULAR_RATE && wanted == Dimension::FREQUENCY && range.contains(value);
-    meant.then(|| format!("{} Hz", text::digits(value)))
 }
 
 /// Meanings of a quantity with a comma: a decimal comma, or commas between thousands.
@@ -211,7 +120,7 @@ fn without_commas(found: &str) -> String {
 
 /// Code, message and help for a text that is not a quantity.
 pub(super) fn bad_quantity(key: &Key, path: &str, found: &str, problem: &Problem) -> (Code, String, String) {
-    let form = template_of(key, path);
+    let form = key.form(path);
     let such_as = format!("write a number and a unit, in the form {form}");
     let is = format!("`{path}` is \"{}\"", text::shorten(found));
     match problem {
@@ -220,22 +129,24 @@ pub(super) fn bad_quantity(key: &Key, path: &str, found: &str, problem: &Problem
         }
         Problem::NoNumber => (codes::BAD_QUANTITY, format!("{is}: a quantity starts with a number"), such_as),
         Problem::Comma => (codes::BAD_QUANTITY, format!("{is}: a comma in a number"), without_commas(found)),
-        Problem::UnknownUnit(unit, meant) => (
-            codes::UNKNOWN_UNIT,
-            format!("{is}: unknown unit {}", text::quote(unit)),
-            meant.map_or_else(
-                || {
-                    let units = units_of(key, path).map_or_else(String::new, |units| format!(", such as {units}"));
-                    format!("write a unit as in {form}{units}; upper and lower case matter")
-                },
-                |m| format!("did you mean \"{m}\"? Upper and lower case matter"),
-            ),
-        ),
-        Problem::AmbiguousQuotient => (
-            codes::BAD_QUANTITY,
-            format!("{is}: the product after the slash is ambiguous"),
-            "group it, as in \"N/(m s)\", or write the numerator first, as in \"N s/m\"".to_owned(),
-        ),
+        Problem::UnknownUnit(unit, meant) => {
+            let units = units_of(key, path).map_or_else(String::new, |units| format!(", such as {units}"));
+            let help = match meant.as_slice() {
+                [] => format!("write a unit as in {form}{units}; upper and lower case matter"),
+                [only] => suggestion::did_you_mean(only),
+                several => format!("did you mean {}?", suggestion::any_of(several)),
+            };
+            (codes::UNKNOWN_UNIT, format!("{is}: unknown unit {}", text::quote(unit)), help)
+        }
+        Problem::AmbiguousUnit(all) => {
+            let message = format!("{is}: this can be read as {}", suggestion::any_of(all));
+            (codes::UNKNOWN_UNIT, message, suggestion::choice(key, path, all).map_or(such_as, |meant| meant.help))
+        }
+        Problem::AmbiguousQuotient(all) => {
+            let message = format!("{is}: the product after the slash is ambiguous");
+            let group = || "group it, as in \"N/(m s)\", or write the numerator first, as in \"N s/m\"".to_owned();
+            (codes::BAD_QUANTITY, message, suggestion::choice(key, path, all).map_or_else(group, |meant| meant.help))
+        }
         Problem::BadPower => (
             codes::BAD_QUANTITY,
             format!("{is}: the power of a unit is a whole number from -9 to 9"),

@@ -10,13 +10,13 @@ use super::findings::Findings;
 use super::keys::{self, Key, Kind, MAX_TABLES, Presence, SECTIONS, Section};
 use super::names::{Meaning, called, child_name, elsewhere, known_names, lookup};
 use super::value::ValueReader;
-use super::{messages, text};
+use super::{messages, suggestion, text};
 use crate::diagnostic::codes;
 use crate::keys::fields::{Field, Fields};
 
 /// Reads every value of `root`; errors go to `findings`.
 pub(super) fn read(source: &str, root: &DeTable<'_>, findings: &mut Findings) -> Fields {
-    let mut reader = Reader { source, fields: Fields::of(source), findings, seen: BTreeSet::new() };
+    let mut reader = Reader { source, root, fields: Fields::of(source), findings, seen: BTreeSet::new() };
     if let Some(section) = keys::section("") {
         reader.table(section, "", root, None);
     }
@@ -26,6 +26,7 @@ pub(super) fn read(source: &str, root: &DeTable<'_>, findings: &mut Findings) ->
 
 struct Reader<'a> {
     source: &'a str,
+    root: &'a DeTable<'a>,
     fields: Fields,
     findings: &'a mut Findings,
     /// Sections in the file, also under a misspelt name.
@@ -66,7 +67,7 @@ impl Reader<'_> {
         }
     }
 
-    /// The form of the keys in `found`, or the first form if there are none; two forms are a finding.
+    /// The first form that has all keys in `found`; two forms are a finding.
     fn form(
         &mut self,
         section: &'static Section,
@@ -74,28 +75,33 @@ impl Reader<'_> {
         found: &BTreeMap<&'static str, Range<usize>>,
     ) -> Option<&'static str> {
         let forms = section.forms();
-        let keys_of = |form| section.keys.iter().filter(move |key| key.presence == Presence::Form(form));
-        let given: Vec<_> =
-            forms.iter().filter_map(|form| keys_of(form).find(|key| found.contains_key(key.name))).collect();
-        if let [first, second, ..] = given.as_slice() {
-            let names = |form: &Presence| {
-                let keys = section.keys.iter().filter(|key| key.presence == *form).map(|key| key.name);
-                keys.collect::<Vec<_>>().join(", ")
+        let given: Vec<&Key> = section
+            .keys
+            .iter()
+            .filter(|key| !key.presence.forms().is_empty() && found.contains_key(key.name))
+            .collect();
+        let fits = |form: &&&str| given.iter().all(|key| key.presence.forms().contains(form));
+        let fitting = forms.iter().find(fits).copied();
+        let apart = |a: &Key, b: &Key| !a.presence.forms().iter().any(|form| b.presence.forms().contains(form));
+        let mut pairs = given.iter().flat_map(|first| given.iter().map(move |second| (first, second)));
+        if fitting.is_none()
+            && let Some((first, second)) = pairs.find(|(first, second)| apart(first, second))
+        {
+            let names = |key: &Key| {
+                let own = key.presence.forms().first();
+                let keys = section.keys.iter().filter(|key| key.presence.forms().iter().any(|form| Some(form) == own));
+                keys.map(|key| key.name).collect::<Vec<_>>().join(", ")
             };
             self.findings.add(
                 codes::ALTERNATIVES,
                 &keys::join(path, second.name),
                 found.get(second.name).cloned().unwrap_or(0..0),
                 format!("`{}` and `{}` are alternatives; give only one", second.name, first.name),
-                format!("give all keys of one form: {}; or {}", names(&first.presence), names(&second.presence)),
+                format!("give all keys of one form: {}; or {}", names(first), names(second)),
             );
-            // Missing keys of either form are not reported.
-            return None;
         }
-        match given.first().map(|key| key.presence) {
-            Some(Presence::Form(form)) => Some(form),
-            _ => forms.first().copied(),
-        }
+        // Without one, missing keys of either form are not reported.
+        fitting
     }
 
     /// Reads the tables of a repeated section.
@@ -169,7 +175,7 @@ impl Reader<'_> {
     ) -> bool {
         let written = name.get_ref().as_ref();
         let DeValue::String(text) = value.get_ref() else { return false };
-        let Some(time) = messages::time_of_rate(key, text).filter(|_| written != key.name) else { return false };
+        let Some(time) = suggestion::time_of_rate(key, text).filter(|_| written != key.name) else { return false };
         let line = format!("{} = \"{time}\"", key.name);
         let place = name.span().start..value.span().end;
         self.findings.instead(&keys::join(table, &text::shorten(written)), place, &line);
@@ -226,7 +232,8 @@ impl Reader<'_> {
 
     fn value(&mut self, table: &str, key: &'static Key, value: &Spanned<DeValue<'_>>) {
         let path = keys::join(table, key.name);
-        let mut reader = ValueReader { source: self.source, key, path: &path, findings: self.findings };
+        let mut reader =
+            ValueReader { source: self.source, key, path: &path, spec: self.root, findings: self.findings };
         if let Some(field) = reader.read(value) {
             self.fields.insert(path, field);
         }
@@ -243,7 +250,7 @@ impl Reader<'_> {
     ) {
         let path = keys::join(table, key.name);
         match key.presence {
-            Presence::Form(of) if Some(of) != form => {}
+            Presence::Form(of) if form.is_none_or(|form| !of.contains(&form)) => {}
             Presence::Required | Presence::Form(_) => {
                 let place = if section.name.is_empty() {
                     "at the start of the file, before the first section".to_owned()
@@ -268,7 +275,7 @@ impl Reader<'_> {
         let Ok(value) = DeValue::parse(literal) else {
             return;
         };
-        let mut reader = ValueReader { source: literal, key, path: &path, findings: self.findings };
+        let mut reader = ValueReader { source: literal, key, path: &path, spec: self.root, findings: self.findings };
         if let Some(field) = reader.read(&value) {
             let items = field.items.iter().map(|_| header.clone()).collect();
             self.fields.insert(path, Field { span: header.clone(), items, given: false, ..field });
@@ -331,7 +338,8 @@ mod tests {
                     let value = DeValue::parse(literal).expect(literal);
                     let mut findings = Findings::default();
                     let path = section.path(key.name);
-                    let mut reader = ValueReader { source: literal, key, path: &path, findings: &mut findings };
+                    let spec = &DeTable::default();
+                    let mut reader = ValueReader { source: literal, key, path: &path, spec, findings: &mut findings };
                     assert!(reader.read(&value).is_some(), "{path} = {literal}: {:?}", findings.all());
                 }
             }

@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 
 use super::keys::{Key, Kind, Presence, SECTIONS, Shape};
 use super::messages::range_of;
+use crate::quantity;
 
 const HEAD: &str = "\
 <!-- Generated from the sections in codegen/language/src/model/; do not edit. -->
@@ -11,11 +12,18 @@ const HEAD: &str = "\
 # Keys of a spec
 
 A spec is one TOML file. A value with a dimension is a text with number and unit: `\"1.195 kg\"`, `\"3.26e7 g mm^2\"`,
-`\"0.012 pi rad\"`, `\"40 V/ms\"`, `\"12 N m/rad\"`. Units are m, g, s, min, V, N, Hz, rad, deg, arcmin, arcsec, Pa, J, W, A, F and B
-with the prefixes f p n u (also µ) m c d k M G T; bytes take k M G T and Ki Mi Gi. A space, `*` or `·` multiplies,
-`/` divides by the one unit that follows (group several: `N/(m s)`), `^` raises to a power.
+`\"0.012 pi rad\"`, `\"40 V/ms\"`, `\"12 N m/rad\"`.
+
+UNITS
+
+A space, `*`, `·` or, between letters, `-` multiplies; `/` divides by the one unit that follows (group several:
+`N/(m s)`); `^2`, `**2`, `²` and `2` directly behind a unit are powers; `×10^7` is `e7`.
+Words (`inch`, `micrometer`), units without a blank (`kgcm²`, `Nm`) and other capital letters (`KHZ`) are taken if only one
+reading has the dimension of the key, as in `lb/in` for a stiffness; otherwise the finding shows the readings.
 Radians count as a unit: a rotational stiffness is in N m/rad, a bandwidth in rad/s and not in Hz.
-A conversion to SI rounds once, so that `\"150 mm\"` is the double nearest to 0.15.
+A conversion to SI rounds once, to the nearest double: `\"150 mm\"` is 0.15, `\"1 in\"` is 0.0254.
+Noise is an rms value. For a density such as `nm/√Hz` the finding shows the rms value up to half the control rate, and for a
+radius of gyration the moment of inertia.
 
 The column *example* shows the form of a value with its unit; any other unit of the same dimension will do. Ranges are those of a single
 value; [Findings](diagnostics.md) lists what is checked across values, and a finding names the keys that it is about.
@@ -25,7 +33,7 @@ File names are relative to the spec and use forward slashes.
 /// The reference as Markdown.
 #[must_use]
 pub fn reference_markdown() -> String {
-    let mut text = HEAD.to_owned();
+    let mut text = HEAD.replace("UNITS", &quantity::units_markdown());
     for section in SECTIONS {
         let title = if section.name.is_empty() { "Before the first section".to_owned() } else { section.header() };
         let optional = if section.kind == Kind::Optional {
@@ -107,7 +115,7 @@ fn absence(key: &Key) -> String {
         Presence::Default(literal) => format!("`{literal}`"),
         Presence::Optional => "no check".to_owned(),
         Presence::InsteadOf(other) => format!("see `{other}`"),
-        Presence::Form(form) => format!("error, unless in another form than {form}"),
+        Presence::Form(forms) => format!("error, unless in another form than {}", forms.join(" or ")),
         Presence::Rule(rule) => rule.to_owned(),
     }
 }

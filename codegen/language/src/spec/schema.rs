@@ -8,9 +8,13 @@ use serde_json::{Map, Value, json};
 use super::keys::{Item, Key, Kind, MAX_NAME, Presence, SECTIONS, Section, Shape};
 use super::messages::range_of;
 
-/// A sign, a number, and a unit that starts with a letter, a degree sign or a bracket.
-const QUANTITY_PATTERN: &str =
-    r"^\s*[+\-\u2212]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+\-]?[0-9]+)?\s*[A-Za-z\u00b0\u00b5\u03bc\u03c0(][^,]*$";
+/// A sign, a number, and a unit that starts with a letter, a degree sign, a mark of feet or inches, or a bracket.
+const QUANTITY_PATTERN: &str = concat!(
+    r"^\s*[+\-\u2212]?([0-9]+\.?[0-9]*|\.[0-9]+)",
+    r"([eE][+\-\u2212]?[0-9]+|(\s*[xX*\u00d7\u00b7\u22c5]\s*10)?(\^|\*\*)[+\-\u2212]?[0-9]+",
+    r"|(\s*[xX*\u00d7\u00b7\u22c5]\s*10)?[\u207a\u207b]?[\u2070\u00b9\u00b2\u00b3\u2074-\u2079]+)?",
+    r#"\s*[A-Za-z\u00b0\u00b5\u03bc\u03c0('"\u2032\u2033][^,]*$"#,
+);
 
 /// The schema as pretty-printed JSON with a final newline; `specs/platform.schema.json` is this text.
 #[must_use]
@@ -96,8 +100,8 @@ fn forms(section: &Section) -> Vec<Value> {
         section.keys.iter().filter(|key| wanted(key.presence)).map(|key| key.name).collect()
     };
     let one_form = |form: &'static str| {
-        let own = names(&|presence| presence == Presence::Form(form));
-        let other = names(&|presence| matches!(presence, Presence::Form(of) if of != form));
+        let own = names(&|presence| presence.forms().contains(&form));
+        let other = names(&|presence| !presence.forms().is_empty() && !presence.forms().contains(&form));
         let none: Vec<Value> = other.iter().map(|name| json!({"required": [name]})).collect();
         json!({"required": own, "not": {"anyOf": none}})
     };

@@ -5,7 +5,7 @@ mod number;
 use std::ops::Range;
 
 use toml::Spanned;
-use toml::de::DeValue;
+use toml::de::{DeTable, DeValue};
 
 use super::findings::Findings;
 use super::keys::{self, Item, Key, MAX_NAME, Shape};
@@ -18,6 +18,8 @@ pub(super) struct ValueReader<'a> {
     pub(super) source: &'a str,
     pub(super) key: &'static Key,
     pub(super) path: &'a str,
+    /// The other values, for helps.
+    pub(super) spec: &'a DeTable<'a>,
     pub(super) findings: &'a mut Findings,
 }
 

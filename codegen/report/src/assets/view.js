@@ -177,6 +177,7 @@ class View {
       element("circle", { cx: at[0], cy: at[1], r: 8.5, fill: "var(--card)", stroke: color }, svg);
       this.text(at[0], at[1] + 4, String(k), "strong");
     }
+    if (this.turn[1] > 1.5 && !data.live) { this.joints("B", base); this.joints("P", top); }
     if (data.part) this.box(on, data.part, 0.26 * rp);
     if (!data.ghost) this.gauges(0.42 * rp, bad.gauges || []);
     if (data.live) this.plate(p => this.moved(p, [0, 0, 0, 0, 0, 0]), rp * 1.02, 0, { side: "none", face: "none", edge: "var(--ink2)", dash: "5 3", width: 1.5 });
@@ -191,6 +192,18 @@ class View {
     for (const [k, text] of (data.texts || []).entries()) this.text(8, 16 + 17 * k, text, "orange halo", "start");
     for (const [name, button] of this.buttons) button.classList.toggle("on", VIEWS[name].every((v, k) => Math.abs(v - this.turn[k]) < 1e-9));
     this.figure.dataset.points = 12 + this.poses.length;
+  }
+
+  // Names of joints from above: outside their circle, away from the other joint of a pair.
+  joints(body, places) {
+    const unit = (from, to) => { const d = [to[0] - from[0], to[1] - from[1]], l = Math.hypot(...d) || 1; return [d[0] / l, d[1] / l]; };
+    const centre = this.project([0, 0, 0]);
+    places.forEach((p, k) => {
+      const far = q => q === p ? Infinity : Math.hypot(q[0] - p[0], q[1] - p[1]);
+      const near = places.reduce((best, q) => far(q) < far(best) ? q : best, places[k ? 0 : 1]);
+      const out = unit(centre, p), away = unit(near, p);
+      this.text(p[0] + 13 * out[0] + 8 * away[0], p[1] + 13 * out[1] + 8 * away[1] + 4, body + k, "halo");
+    });
   }
 
   axes(length) {

@@ -9,7 +9,7 @@ use super::ValueReader;
 use crate::diagnostic::codes;
 use crate::quantity::{self, Dimension, Problem};
 use crate::spec::keys::Item;
-use crate::spec::{messages, text};
+use crate::spec::{messages, suggestion, text};
 
 impl ValueReader<'_> {
     pub(super) fn quantity(&mut self, item: Item, path: &str, value: &Spanned<DeValue<'_>>) -> Option<f64> {
@@ -29,16 +29,17 @@ impl ValueReader<'_> {
                 return self.wrong_type(path, value, &format!("{} in quotes", dimension.describe()), None);
             }
         };
-        match quantity::parse(found) {
+        match quantity::parse_as(found, dimension) {
             Ok(quantity) if quantity.dimension == Dimension::NONE => {
                 self.unit_missing(path, span, found.trim());
                 None
             }
             Ok(quantity) if quantity.dimension != dimension => {
-                let (message, help) = messages::wrong_dimension(self.key, path, found, quantity.dimension, dimension);
-                self.findings.add(codes::WRONG_DIMENSION, path, span, message, help);
-                let time = messages::time_of_rate(self.key, found);
-                self.findings.replace_by(path, time.map(|time| format!("\"{time}\"")));
+                let (shown, is) = (text::shorten(found), quantity.dimension.describe());
+                let message = format!("`{path}` is \"{shown}\": this is {is}, expected {}", dimension.describe());
+                let meant = suggestion::of_other(self.key, item, path, found, &quantity, self.spec)?;
+                self.findings.add(codes::WRONG_DIMENSION, path, span, message, meant.help);
+                self.findings.replace_by(path, meant.value.map(|value| format!("\"{value}\"")));
                 None
             }
             Ok(quantity) => {
@@ -50,12 +51,15 @@ impl ValueReader<'_> {
                 let place = self.inside(&span, found, &error.range);
                 let (code, message, help) = messages::bad_quantity(self.key, path, found, &error.problem);
                 let replacement = match &error.problem {
-                    // If escapes shifted it, the place is the whole value.
-                    Problem::UnknownUnit(unit, Some(meant)) if self.source.get(place.clone()) == Some(unit) => {
-                        Some((*meant).to_owned())
-                    }
+                    Problem::UnknownUnit(_, meant) if meant.len() == 1 => meant.first().cloned(),
+                    // Its number is as it was written.
+                    Problem::AmbiguousUnit(all) if found.trim() == found => suggestion::choice(self.key, path, all)
+                        .and_then(|meant| Some(meant.value?.get(error.range.start..)?.to_owned())),
                     _ => None,
                 };
+                // If escapes shifted it, the place is the whole value.
+                let replacement =
+                    replacement.filter(|_| self.source.get(place.clone()) == found.get(error.range.clone()));
                 self.findings.add(code, path, place, message, help);
                 self.findings.replace_by(path, replacement);
                 None

@@ -1,0 +1,285 @@
+//! Twelve joints from a CSV file, as CAD programs write lists of points.
+
+use std::path::Path;
+
+use super::findings::Findings;
+use super::text;
+use crate::diagnostic::codes;
+use crate::files;
+use crate::keys::fields::{Field, Fields, KeyValue};
+use crate::quantity::{self, Dimension};
+
+const KEY: &str = "geometry.joints";
+/// Largest file, bytes.
+const LARGEST: u64 = 1 << 16;
+/// Largest coordinate, m, as of `geometry.base_joints`.
+const FARTHEST: f64 = 10.0;
+const EXAMPLE: &str = "leg,where,x_mm,y_mm,z_mm";
+
+/// Columns that say which joint a line is, in small letters.
+const LEGS: &[&str] = &["leg", "number", "no", "no.", "nr", "#", "id", "index"];
+const BODIES: &[&str] = &["where", "body", "part", "plate", "side", "joint", "name", "point", "label"];
+/// First letters of the names of a body: base, bottom, fixed, lower; platform, top, moving, upper.
+const BASE: [char; 4] = ['b', 'f', 'l', 'g'];
+const PLATFORM: [char; 4] = ['p', 't', 'm', 'u'];
+
+/// What is wrong with a file: its line, if it is one, and the help.
+struct Refusal {
+    line: Option<usize>,
+    message: String,
+    help: String,
+}
+
+fn refuse<T>(line: usize, message: String, help: impl Into<String>) -> Result<T, Refusal> {
+    Err(Refusal { line: Some(line), message, help: help.into() })
+}
+
+/// Replaces `geometry.joints` by the joints in its file, as if they were given one by one.
+pub(super) fn read(fields: &mut Fields, dir: &Path, findings: &mut Findings) {
+    let Some(name) = fields.name(KEY).map(str::to_owned) else { return };
+    let span = fields.span(KEY);
+    let read = files::text_of(&dir.join(&name), LARGEST).map_err(|error| {
+        let (message, help) = (format!("cannot be read: {error}"), error.help().to_owned());
+        Refusal { line: None, message, help }
+    });
+    match read.and_then(|text| joints(&text)) {
+        Ok(bodies) => {
+            for (key, joints) in ["geometry.base_joints", "geometry.platform_joints"].into_iter().zip(bodies) {
+                let parsed = KeyValue::Numbers(joints.as_flattened().to_vec());
+                let items = vec![span.clone(); 6];
+                fields.insert(key.to_owned(), Field { parsed, span: span.clone(), items, given: true });
+            }
+        }
+        Err(Refusal { line, message, help }) => {
+            let place = line.map_or_else(String::new, |line| format!(", line {line}"));
+            let message = format!("\"{}\"{place}: {message}", text::shorten(&name));
+            findings.add(codes::JOINT_FILE, KEY, span, message, help);
+        }
+    }
+}
+
+/// Places of the columns, and the units of the coordinates.
+struct Head<'a> {
+    separator: char,
+    leg: Option<usize>,
+    body: Option<usize>,
+    coordinates: [(usize, &'a str); 3],
+}
+
+/// A line of the file.
+struct Joint {
+    line: usize,
+    leg: Option<i64>,
+    is_platform: Option<bool>,
+    point: [f64; 3],
+}
+
+/// The joints of the base and of the platform, leg by leg, m.
+fn joints(text: &str) -> Result<[[[f64; 3]; 6]; 2], Refusal> {
+    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+    let numbered = text.lines().enumerate().map(|(at, line)| (at + 1, line.trim()));
+    let mut lines = numbered.filter(|(_, line)| !line.is_empty() && !line.starts_with(['#', '%']));
+    let Some((first, names)) = lines.next() else {
+        return refuse(1, "the file is empty".to_owned(), format!("begin with a head such as {EXAMPLE}"));
+    };
+    let head = Head::of(first, names)?;
+    let mut found = lines.map(|(line, text)| head.joint(line, text)).collect::<Result<Vec<Joint>, Refusal>>()?;
+    if found.len() != 12 {
+        let message = format!("there are {} joints, expected 12", found.len());
+        return Err(Refusal {
+            line: None,
+            message,
+            help: "write six lines of the base and six of the platform".to_owned(),
+        });
+    }
+    for (at, joint) in found.iter_mut().enumerate() {
+        joint.is_platform.get_or_insert(at >= 6);
+    }
+    let bodies = [false, true].map(|body| of_body(&found, body));
+    let [base, platform] = bodies;
+    Ok([base?, platform?])
+}
+
+/// The joints of one body, leg by leg.
+fn of_body(all: &[Joint], is_platform: bool) -> Result<[[f64; 3]; 6], Refusal> {
+    let own: Vec<&Joint> = all.iter().filter(|joint| joint.is_platform == Some(is_platform)).collect();
+    let name = if is_platform { "platform" } else { "base" };
+    let numbers: Vec<i64> = own.iter().enumerate().map(|(at, joint)| joint.leg.unwrap_or(at as i64)).collect();
+    // Legs count from 0; many lists count from 1.
+    let from = i64::from(!numbers.contains(&0));
+    let of_leg = |leg: i64| own.iter().zip(&numbers).filter(move |(_, number)| **number == leg + from);
+    let mut points = [[0.0; 3]; 6];
+    for (point, leg) in points.iter_mut().zip(0..) {
+        let mut joints = of_leg(leg).map(|(joint, _)| joint);
+        let Some(joint) = joints.next() else {
+            let message = format!("the {name} has no joint of leg {}", leg + from);
+            return Err(Refusal {
+                line: None,
+                message,
+                help: "number the legs of each body from 0 to 5, or from 1 to 6".to_owned(),
+            });
+        };
+        if let Some(other) = joints.next() {
+            let message = format!("leg {} has a second joint at the {name}", leg + from);
+            return refuse(other.line, message, "number the legs of each body from 0 to 5, or from 1 to 6");
+        }
+        *point = joint.point;
+    }
+    Ok(points)
+}
+
+fn cells(line: &str, separator: char) -> Vec<&str> {
+    line.split(separator).map(|cell| cell.trim().trim_matches('"').trim()).collect()
+}
+
+impl<'a> Head<'a> {
+    fn of(line: usize, names: &'a str) -> Result<Self, Refusal> {
+        let separator = ['\t', ';'].into_iter().find(|separator| names.contains(*separator)).unwrap_or(',');
+        let names = cells(names, separator);
+        let called = |known: &[&str]| names.iter().position(|name| known.contains(&name.to_lowercase().as_str()));
+        let coordinate = |axis: char| {
+            let found = names.iter().enumerate().find_map(|(at, name)| {
+                let unit = name.strip_prefix([axis, axis.to_ascii_uppercase()])?;
+                let is_name = !unit.starts_with(char::is_alphanumeric);
+                is_name.then(|| (at, unit.trim_matches(|c: char| c.is_whitespace() || "_[]()/,.".contains(c))))
+            });
+            let head = format!("write the names and the unit in the first line: {EXAMPLE}");
+            let Some((at, unit)) = found else {
+                return refuse(line, format!("there is no column {axis}"), head);
+            };
+            if quantity::parse_as(&format!("1 {unit}"), Dimension::LENGTH)
+                .is_ok_and(|one| one.dimension == Dimension::LENGTH)
+            {
+                return Ok((at, unit));
+            }
+            refuse(line, format!("the column {axis} has no unit of length"), head)
+        };
+        let coordinates = [coordinate('x')?, coordinate('y')?, coordinate('z')?];
+        Ok(Self { separator, leg: called(LEGS), body: called(BODIES), coordinates })
+    }
+
+    fn joint(&self, line: usize, text: &str) -> Result<Joint, Refusal> {
+        let cells = cells(text, self.separator);
+        let cell = |at: usize| cells.get(at).copied().unwrap_or_default();
+        let mut point = [0.0; 3];
+        for (value, (at, unit)) in point.iter_mut().zip(self.coordinates) {
+            let decimal = if self.separator == ',' { cell(at).to_owned() } else { cell(at).replace(',', ".") };
+            // With its unit, so that it has the bits of the same text in a spec.
+            let number = quantity::parse(&decimal).is_ok_and(|number| number.dimension == Dimension::NONE);
+            let read = quantity::parse_as(&format!("{decimal} {unit}"), Dimension::LENGTH).ok().filter(|_| number);
+            let Some(read) = read.filter(|read| (-FARTHEST..=FARTHEST).contains(&read.value)) else {
+                let message = format!("`{}` is no coordinate from -10 m to 10 m", text::shorten(cell(at)));
+                return refuse(line, message, "write a number with a decimal point; its unit is in the first line");
+            };
+            *value = if read.value == 0.0 { 0.0 } else { read.value };
+        }
+        let (name, number) = self.body.map_or(("", ""), |at| {
+            let name = cell(at);
+            name.split_at(name.trim_end_matches(|c: char| c.is_ascii_digit()).len())
+        });
+        let is_platform = match name.chars().next().map(|letter| letter.to_ascii_lowercase()) {
+            None => None,
+            Some(letter) if BASE.contains(&letter) => Some(false),
+            Some(letter) if PLATFORM.contains(&letter) => Some(true),
+            Some(_) => {
+                let message = format!("`{}` is neither base nor platform", text::shorten(name));
+                return refuse(line, message, "write base or platform, or B0 to B5 and P0 to P5");
+            }
+        };
+        let given = self.leg.map_or(number, cell);
+        let leg = given.parse().ok();
+        if leg.is_none() && (self.leg.is_some() || !given.is_empty()) {
+            let message = format!("`{}` is no number of a leg", text::shorten(given));
+            return refuse(line, message, "number the legs from 0 to 5, or from 1 to 6");
+        }
+        Ok(Joint { line, leg, is_platform, point })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const BODY: [[f64; 2]; 6] = [[1.0, 0.0], [0.5, 0.9], [-0.5, 0.9], [-1.0, 0.0], [-0.5, -0.9], [0.5, -0.9]];
+
+    /// Twelve lines: leg from `first`, body as `name` has it, coordinates in mm.
+    fn file(head: &str, first: usize, row: impl Fn(usize, bool, [String; 3]) -> String) -> String {
+        let mut text = format!("{head}\n");
+        for is_platform in [false, true] {
+            for (leg, [x, y]) in BODY.iter().enumerate() {
+                let far = if is_platform { 100.5 } else { 150.0 };
+                let point = [x * far, y * far, f64::from(u8::from(is_platform))].map(|v| format!("{v}"));
+                text += &format!("{}\n", row(leg + first, is_platform, point));
+            }
+        }
+        text
+    }
+
+    fn body(is_platform: bool) -> &'static str {
+        if is_platform { "platform" } else { "base" }
+    }
+
+    fn plain() -> String {
+        file(EXAMPLE, 0, |leg, top, [x, y, z]| format!("{leg},{},{x},{y},{z}", body(top)))
+    }
+
+    #[test]
+    fn lists_of_many_programs_give_the_same_joints() {
+        let expected = joints(&plain()).ok().expect("the plain form");
+        assert_eq!(expected[1][1][0].to_bits(), quantity::parse("50.25 mm").expect("a length").value.to_bits());
+        let turned = |text: String| {
+            let mut lines: Vec<&str> = text.lines().collect();
+            lines[1..].reverse();
+            lines.join("\r\n")
+        };
+        for (what, text) in [
+            ("from 1", file(EXAMPLE, 1, |leg, top, [x, y, z]| format!("{leg},{},{x},{y},{z}", body(top)))),
+            ("reversed, Windows", turned(plain())),
+            ("without legs and bodies", file("x (mm),y (mm),z (mm)", 0, |_, _, [x, y, z]| format!("{x},{y},{z}"))),
+            (
+                "names",
+                file("Name;X [mm];Y [mm];Z [mm]", 1, |leg, top, point| {
+                    format!("\"{}{leg}\";{}", if top { "P" } else { "B" }, point.join(";").replace('.', ","))
+                }),
+            ),
+            (
+                "tabs, other order",
+                file("\u{feff}z_mm\ty_mm\tx_mm\tPoint", 0, |leg, top, [x, y, z]| {
+                    format!("{z}\t{y}\t{x}\t{} {leg}", if top { "Top" } else { "Bottom" })
+                }),
+            ),
+            (
+                "metres",
+                file("# CAD\nleg,where,x_m,y_m,z_m", 0, |leg, top, point| {
+                    format!("{leg},{},{}", body(top), point.map(|v| v + "e-3").join(","))
+                }),
+            ),
+        ] {
+            let found = joints(&text).unwrap_or_else(|refused| panic!("{what}: {}: {text}", refused.message));
+            assert_eq!(found, expected, "{what}");
+        }
+    }
+
+    #[test]
+    fn a_wrong_line_is_named() {
+        let plain = plain();
+        let without_last = plain.trim_end().rsplit_once('\n').expect("lines").0.to_owned();
+        for (text, line, words) in [
+            (String::new(), Some(1), "is empty"),
+            (plain.replace("x_mm", "x"), Some(1), "the column x has no unit"),
+            (plain.replace("y_mm", "y_kg"), Some(1), "the column y has no unit"),
+            (plain.replace("z_mm", "height"), Some(1), "there is no column z"),
+            (plain.replace("0,base,150", "0,base,wide"), Some(2), "`wide` is no coordinate"),
+            (plain.replace("0,base,150", "0,base,15000"), Some(2), "`15000` is no coordinate"),
+            (plain.replace("0,base", "first,base"), Some(2), "`first` is no number"),
+            (plain.replace("0,base", "0,arm"), Some(2), "`arm` is neither"),
+            (plain.replace("1,base", "2,base"), None, "the base has no joint of leg 1"),
+            (plain.replace("5,base", "5,platform"), None, "the base has no joint of leg 5"),
+            (without_last, None, "there are 11 joints"),
+        ] {
+            let refused = joints(&text).err().unwrap_or_else(|| panic!("{text}"));
+            assert_eq!(refused.line, line, "{}: {text}", refused.message);
+            assert!(refused.message.contains(words) && !refused.help.is_empty(), "{}: {text}", refused.message);
+        }
+    }
+}
