@@ -38,8 +38,8 @@ pub(super) fn parse(text: &str, quantity: &Quantity, per: Option<f64>) -> Result
     let size = |unit: &str| if unit.trim().is_empty() { per } else { quantity.per(unit) };
     let offset = if offset.is_empty() { Some((0.0, "")) } else { number(offset) };
     let Some((offset, offset_unit)) = offset else { return expected("a number behind the sign of the offset") };
-    // An offset has the unit of the factor, and without a factor the other way round.
-    let unit = if unit.trim().is_empty() { offset_unit } else { unit };
+    // An offset without unit has that of the factor. Without a factor and a unit in the name it is the other way round.
+    let unit = if unit.trim().is_empty() && per.is_none() { offset_unit } else { unit };
     let (Some(factor_per), Some(offset_per)) =
         (size(unit), size(if offset_unit.trim().is_empty() { unit } else { offset_unit }))
     else {
