@@ -13,9 +13,7 @@ use specgen::compile::Compilation;
 use specgen::model::Mcu;
 use specgen::target::Image;
 use specgen::verify;
-use specgen_tests::{Emitted, assert_same_bits, column, damped, host_trace, integers, length};
-
-use crate::rate_options::{DYNAMIC, FELL_BACK, rate_table};
+use specgen_tests::{Emitted, assert_same_bits, column, damped, host_trace, integers};
 
 /// Ticks of each mode under the hostile record.
 fn ticks() -> usize {
@@ -44,13 +42,11 @@ const PARTS: (&str, &str) = (
     "interaction     = \"none\"",
     "active_damping  = true\nhand_over       = true\ncorrection      = \"2 um\"\ninteraction     = \"none\"",
 );
-/// The model of rate-dependent hysteresis.
-const RATE: (&str, &str) = ("memory  = 64", DYNAMIC);
 /// On-board trajectories ten times as fast, so that a stretch of the hostile record sees most of one.
 pub const FAST: (&str, &str) = ("frequency = \"1 Hz\"", "frequency = \"10 Hz\"");
 
 fn compare(name: &str, edits: &[(&str, &str)], mcus: &[Mcu]) {
-    let emitted = Emitted::with_records(name, "reference.toml", edits, &[("mu1.csv", rate_table())]);
+    let emitted = Emitted::new(name, "reference.toml", edits);
     let mut controller = emitted.at_run_time();
     let description = controller.description().clone();
     let images: Vec<Image> = mcus.iter().filter_map(|mcu| emitted.image(*mcu)).collect();
@@ -60,10 +56,6 @@ fn compare(name: &str, edits: &[(&str, &str)], mcus: &[Mcu]) {
         let settings = [("mode", mode), ("interaction", interaction), ("environment_stiffness[2]", 3e6)];
         let (hostile, config) = host_trace(&mut controller, &settings, &inputs);
         covers(&hostile, what, interaction == MEASURED);
-        if edits.contains(&RATE) {
-            let back = integers(&hostile, "status").iter().filter(|word| **word & FELL_BACK != 0).count();
-            assert!(back > 100 && back < ticks(), "{what}: {back} ticks with the static inverse");
-        }
         // The controller keeps these settings.
         let Compilation { model, ir, .. } = &*emitted.compiled;
         let tracking = verify::exercise(&mut controller, model, ir, tracked()).unwrap();
@@ -142,10 +134,10 @@ fn covers(trace: &Trace, what: &str, measured: bool) {
 
 #[test]
 fn f64_on_the_host_and_the_m7_is_equal_in_every_bit_of_every_mode() {
-    // In the short run with active damping and the dynamic model, so that one image has both. The plain law is compared on the
-    // image of `platform_budgets`.
-    let more = [damped(), FAST, RATE];
-    compare("platform-bits-f64", length(&more[..], &[FAST]), &[Mcu::Mps2An500]);
+    // In the short run with active damping, whose supervisor is compared on the same image.
+    let damped = [damped(), FAST];
+    let edits = specgen_tests::length(&damped[..], &[FAST]);
+    compare("platform-bits-f64", edits, &[Mcu::Mps2An500]);
 }
 
 #[test]

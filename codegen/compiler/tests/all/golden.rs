@@ -465,7 +465,7 @@ fn no_finding_says_a_number_that_is_none() {
         }
     }
     println!("{count} findings");
-    assert!(count > if full { 1000 } else { 20 }, "{count} findings");
+    assert!(count > if full { 1000 } else { 10 }, "{count} findings");
 }
 
 #[test]
