@@ -17,11 +17,11 @@ use specgen_tests::{Emitted, assert_same_bits, column, damped, host_trace, integ
 
 /// Ticks of each mode under the hostile record.
 fn ticks() -> usize {
-    specgen_tests::length(6_000, 100_000)
+    length(6_000, 100_000)
 }
 /// Ticks of each mode in closed loop.
 fn tracked() -> u32 {
-    specgen_tests::length(3_000, 20_000)
+    length(3_000, 20_000)
 }
 /// `interaction` of a force sensor, and its status bit.
 const MEASURED: f64 = 2.0;
@@ -51,7 +51,7 @@ fn compare(name: &str, edits: &[(&str, &str)], mcus: &[Mcu]) {
     let description = controller.description().clone();
     let images: Vec<Image> = mcus.iter().filter_map(|mcu| emitted.image(*mcu)).collect();
     // In the short run one mode of each group: P, F, P/F.
-    for (seed, (what, mode, interaction)) in (20..).zip(MODES).step_by(specgen_tests::length(3, 1)) {
+    for (seed, (what, mode, interaction)) in (20..).zip(MODES).step_by(length(3, 1)) {
         let inputs = emitted.platform_stimulus(&description, ticks(), seed);
         let settings = [("mode", mode), ("interaction", interaction), ("environment_stiffness[2]", 3e6)];
         let (hostile, config) = host_trace(&mut controller, &settings, &inputs);
