@@ -7,9 +7,9 @@ use host_sim::noise::{Gauge, unit};
 use host_sim::plant::{LegParameters, LegPlant};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
-use specgen::identify::leg_model::{Choice, choose};
+use specgen::identify::leg_model::{Choice, Selection, choose};
 use specgen::identify::rate::RateModel;
-use specgen::identify::{Drive, Options, Record, join, parse_record, predict};
+use specgen::identify::{Drive, Options, Record, error_on, join, parse_record, predict};
 use specgen::model::LegModelKind as Kind;
 use specgen_tests::{leg_class, length};
 
@@ -145,7 +145,8 @@ fn two_rates_give_a_better_leg_model_than_one() {
         let leg = leg_class(u64::from(class));
         let [slow, fast, arbitrary] = three_records(&leg, 0);
         let record = if number % 3 == 0 { slow } else { join(&[slow, fast], VOLTAGE).unwrap() };
-        let other = (number % 3 == 2).then_some(&arbitrary);
+        let other = error_on(&arbitrary);
+        let other = (number % 3 == 2).then_some(&other as &Selection<'_>);
         let choice = choose(&record, other, &Options::new(32, VOLTAGE), Kind::Auto).unwrap();
         let report = &choice.table.report;
         let errors = open_loop(&choice, &leg);

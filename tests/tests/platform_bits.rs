@@ -13,7 +13,7 @@ use specgen::compile::Compilation;
 use specgen::model::Mcu;
 use specgen::target::Image;
 use specgen::verify;
-use specgen_tests::{Emitted, assert_same_bits, column, damped, host_trace, integers};
+use specgen_tests::{Emitted, assert_same_bits, column, damped, host_trace, integers, length};
 
 /// Ticks of each mode under the hostile record.
 fn ticks() -> usize {
@@ -136,7 +136,7 @@ fn covers(trace: &Trace, what: &str, measured: bool) {
 fn f64_on_the_host_and_the_m7_is_equal_in_every_bit_of_every_mode() {
     // In the short run with active damping, whose supervisor is compared on the same image.
     let damped = [damped(), FAST];
-    let edits = specgen_tests::length(&damped[..], &[FAST]);
+    let edits = length(&damped[..], &[FAST]);
     compare("platform-bits-f64", edits, &[Mcu::Mps2An500]);
 }
 

@@ -32,7 +32,6 @@ const LISTED: &[(&str, usize, &str)] = &[
     ("codegen/compiler/src/workspace/hold.rs", 1, OUTPUT),
     ("codegen/compiler/src/workspace/output.rs", 5, OUTPUT),
     ("codegen/compiler/src/workspace/output/replace.rs", 3, OUTPUT),
-    ("codegen/identify/src/container.rs", 1, "opened before by `files`, whose reader wants a path"),
     ("codegen/language/src/files.rs", 3, "the door"),
     ("codegen/language/src/interrupt.rs", 1, OWN),
     ("codegen/language/src/lock.rs", 2, OWN),

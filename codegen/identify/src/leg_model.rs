@@ -26,7 +26,7 @@ use crate::everett::EverettTable;
 use crate::least_squares;
 use crate::regressor::{self, Plane};
 
-pub use families::{Choice, FamilyScore, choose};
+pub use families::{Choice, FamilyScore, Selection, choose};
 pub use family::Family;
 pub(crate) use family::TIMES;
 pub use file::{read_leg_csv, write_leg_csv};

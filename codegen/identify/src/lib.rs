@@ -84,7 +84,7 @@ pub use file::{MAX_FILE_BYTES, read_file};
 pub use grid_choice::{GridChoice, Score, choose_grid};
 pub use joined::join;
 pub use leg_model::{read_leg_csv, write_leg_csv};
-pub use rate::predict::{Drive, Prediction, PredictionError, predict, read_drive, validate};
+pub use rate::predict::{Drive, Prediction, PredictionError, error_on, predict, read_drive, validate};
 pub use reading::Reading;
 pub use record::{Record, parse_record, read_record};
 pub use report::{Branches, Report};

@@ -8,7 +8,7 @@ use host_sim::trajectory::{PoseTarget, PoseTrajectory};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use specgen::identify::leg_model::choose;
-use specgen::identify::{MAX_GRID, Options, join, write_leg_csv};
+use specgen::identify::{MAX_GRID, Options, error_on, join, write_leg_csv};
 use specgen::model::LegModelKind;
 use specgen_tests::{damped, leg_class, length, skipped};
 
@@ -147,7 +147,7 @@ fn identified(leg: &LegParameters, number: u64) -> (usize, String) {
     let [slow, fast, random] = three_records(leg, number);
     let options = Options { finest: MAX_GRID, ..Options::new(32, VOLTAGE) };
     let both = join(&[slow, fast], VOLTAGE).unwrap();
-    let model = choose(&both, Some(&random), &options, LegModelKind::Auto).unwrap().model;
+    let model = choose(&both, Some(&error_on(&random)), &options, LegModelKind::Auto).unwrap().model;
     (model.table.grid, write_leg_csv(&model))
 }
 
@@ -192,7 +192,10 @@ fn the_default_choice_follows_what_does_not_repeat() {
             shown(&format!("class {class}, grid {grid}, {records:?}"), *errors);
         }
         for (_, found) in &found[given.len()..] {
-            assert!(found.iter().zip(BARS[class as usize]).all(|(error, bar)| *error <= bar), "class {class}: {found:?}");
+            assert!(
+                found.iter().zip(BARS[class as usize]).all(|(error, bar)| *error <= bar),
+                "class {class}: {found:?}"
+            );
         }
     }
 }

@@ -10,14 +10,11 @@ use crate::branches::Branch;
 use crate::everett::EverettTable;
 use crate::findings::Findings;
 use crate::normal::{self, Weighting};
-use crate::rate::RateModel;
 use crate::record::Record;
 use crate::regressor::{self, Plane};
 use crate::staircase::Staircase;
 use crate::statistics::{mean, mean_and_error};
-use crate::{
-    DeadTime, Drive, Identification, dead_time, grid_choice, identify, joined, predict, prior, selection, validate,
-};
+use crate::{DeadTime, Identification, dead_time, grid_choice, identify, joined, prior, selection};
 use specgen_language::diagnostic::{Diagnostic, codes};
 use specgen_language::model::LegModelKind as Kind;
 
@@ -58,15 +55,18 @@ pub struct Choice {
     pub table: Identification,
 }
 
-/// Fits the families that `kind` permits to `record`, one or [joined](crate::join), and chooses one: by the error on
-/// the `arbitrary` record if there is one, otherwise on curves that were held out. `options` as in [`identify`]. A model
+/// Rms error (m) of a leg model with a dead time (s) on a record that no fit used, see [`crate::error_on`].
+pub type Selection<'a> = dyn Fn(&LegModel, f64) -> Result<f64, Vec<Diagnostic>> + 'a;
+
+/// Fits the families that `kind` permits to `record`, one or [joined](crate::join), and chooses one: by the `arbitrary`
+/// error if there is one, otherwise on curves that were held out. `options` as in [`identify`]. A model
 /// with plays may be on a finer grid, see [`crate::Options::finest`].
 ///
 /// # Errors
 /// As [`identify`] and [`crate::predict`]; E0622 if the curves turn back at too few voltages to hold any out.
 pub fn choose(
     record: &Record,
-    arbitrary: Option<&Record>,
+    arbitrary: Option<&Selection<'_>>,
     options: &crate::Options,
     kind: Kind,
 ) -> Result<Choice, Vec<Diagnostic>> {
@@ -76,17 +76,17 @@ pub fn choose(
     let coarse =
         crate::Options { grid: if options.grid > PLAYS { PLAYS } else { options.grid }, dead_time, ..*options };
     let table = identify(record, if kind == Kind::Preisach { options } else { &coarse })?;
-    let arbitrary = match arbitrary {
-        Some(other) => validate(&table.table, other, table.report.dead_time).map(|_| Some(Drive::from(other)))?,
-        None => None,
-    };
+    if let Some(error) = arbitrary {
+        // A record that cannot be used is refused.
+        error(&LegModel { table: table.table.clone(), around: None }, table.report.dead_time)?;
+    }
     if kind == Kind::Preisach {
         let family = Family { kind, creep: false };
         let model = LegModel { table: table.table.clone(), around: None };
         return Ok(Choice { family, model, scores: Vec::new(), table });
     }
     let mut findings = Findings::after(&record.shown_as, &table.warnings);
-    let found = chosen((record, arbitrary.as_ref()), options, kind, &table, &mut findings);
+    let found = chosen((record, arbitrary), options, kind, &table, &mut findings);
     let ((family, model, scores), warnings) = findings.conclude(found)?;
     Ok(Choice { family, model, scores, table: Identification { warnings, ..table } })
 }
@@ -102,7 +102,7 @@ struct Candidate {
 }
 
 fn chosen(
-    (record, arbitrary): (&Record, Option<&Drive>),
+    (record, arbitrary): (&Record, Option<&Selection<'_>>),
     options: &crate::Options,
     kind: Kind,
     table: &Identification,
@@ -134,7 +134,8 @@ fn chosen(
     let delay = table.report.dead_time;
     let turned = delay > 0.0 && table.report.lag_of_turns;
     let late = turned.then(|| Record { drive: dead_time::lagged(record, delay), ..record.clone() });
-    let mut data = Data::new(late.as_ref().unwrap_or(record), &plane, &used, &fold_of, if turned { 0.0 } else { delay });
+    let mut data =
+        Data::new(late.as_ref().unwrap_or(record), &plane, &used, &fold_of, if turned { 0.0 } else { delay });
     data.samples.at_rest = at_rest;
     let mut candidates: Vec<Candidate> = Vec::new();
     for family in Family::all().into_iter().filter(|family| kind == Kind::Auto || family.kind == kind) {
@@ -151,12 +152,8 @@ fn chosen(
     let mut chosen: Option<Candidate> = None;
     let noise = WORTHWHILE[1] * table.report.noise_floor;
     let worthwhile = WORTHWHILE[0] * mean(&best).sqrt() + noise * 1e6;
-    let error_on = |model: Option<&LegModel>, drive: &Drive| {
-        let model = RateModel { dead_time: delay, ..RateModel::of_leg(model?.clone()) };
-        Some(predict(&model, drive).ok()?.compared?.rms)
-    };
     let on_arbitrary: Vec<Option<f64>> =
-        candidates.iter().map(|candidate| error_on(candidate.model.as_ref(), arbitrary?)).collect();
+        candidates.iter().map(|candidate| arbitrary?(candidate.model.as_ref()?, delay).ok()).collect();
     let least = on_arbitrary.iter().flatten().copied().reduce(|a, b| if b < a { b } else { a });
     for (candidate, arbitrary_rms) in candidates.into_iter().zip(on_arbitrary) {
         let worse: Vec<f64> = candidate.squares.iter().zip(&best).map(|(a, b)| a.sqrt() - b.sqrt()).collect();

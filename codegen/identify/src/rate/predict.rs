@@ -10,6 +10,7 @@ use crate::cause::{self, Cause};
 use crate::distrust::{JUMP, settling};
 use crate::everett::EverettTable;
 use crate::findings::Findings;
+use crate::leg_model::LegModel;
 use crate::record::{self, Record, later};
 use crate::regressor::Plane;
 use crate::signals::{self, Input, Signals};
@@ -150,6 +151,15 @@ pub struct Prediction {
 /// As [`predict`].
 pub fn validate(table: &EverettTable, record: &Record, dead_time: f64) -> Result<Prediction, Vec<Diagnostic>> {
     predict(&RateModel::of_table(table.clone(), dead_time), &Drive::from(record))
+}
+
+/// Rms error (m) of leg models on `record`, each with its dead time (s); as [`predict`] where it refuses.
+pub fn error_on(record: &Record) -> impl Fn(&LegModel, f64) -> Result<f64, Vec<Diagnostic>> {
+    let drive = Drive::from(record);
+    move |model, dead_time| {
+        let model = RateModel { dead_time, ..RateModel::of_leg(model.clone()) };
+        Ok(predict(&model, &drive)?.compared.map_or(f64::INFINITY, |compared| compared.rms))
+    }
 }
 
 /// Runs `model` over `drive`; `model.dead_time` counts from the drive column.

@@ -175,7 +175,7 @@ impl Search<'_> {
         Some(options.into_iter().flatten().collect::<Vec<_>>().join(" ")).filter(|options| !options.is_empty())
     }
 
-    /// The entry of `--columns` for a quantity in a column. If its unit is not known, a factor of 1 stands for it.
+    /// The entry of `--columns` for a quantity in a column. If its unit is not known, it gets a factor of 1.
     fn entry(&self, name: &'static str, at: usize) -> String {
         let header = self.header.names.get(at);
         match names::quantity(name).filter(|quantity| header.is_some_and(|header| has_other_unit(header, quantity))) {

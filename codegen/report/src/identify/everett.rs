@@ -1,7 +1,7 @@
 //! `specgen identify RECORD`: a record of reversal curves in, an Everett table and its figures out.
 
 use crate::drawing::wrote;
-use specgen_identify::leg_model::{Choice, FamilyScore, choose};
+use specgen_identify::leg_model::{Choice, FamilyScore, Selection, choose};
 use specgen_identify::rate::RateModel;
 use specgen_identify::{self as identify, DeadTime, Drive, GridChoice, Prediction, Report, predict};
 use std::fmt::Write as _;
@@ -56,7 +56,9 @@ pub fn run(
     let grid = grid.or(choice.as_ref().map(|c| c.chosen)).unwrap_or_default();
     let finest = if choice.is_some() { identify::MAX_GRID } else { grid };
     let options = identify::Options { dead_time, finest, ..identify::Options::new(grid, drive) };
-    let chosen = choose(&record, validation.as_ref(), &options, model).map_err(refused)?;
+    let error = validation.as_ref().map(identify::error_on);
+    let error = error.as_ref().map(|error| error as &Selection<'_>);
+    let chosen = choose(&record, error, &options, model).map_err(refused)?;
     let grid = chosen.model.table.grid;
     let families = families(&chosen, grid, validation.as_ref().map(|record| record.shown_as.as_str()));
     let Choice { table: identified, model, scores, .. } = chosen;
