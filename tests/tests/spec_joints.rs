@@ -3,6 +3,7 @@
 use std::fs;
 
 use crate::support::specs::{errors, folder_with_records, source};
+use specgen::compile::compile_source;
 use specgen::diagnostic::{Diagnostic, codes};
 use specgen::model::Model;
 use specgen::spec;
@@ -45,6 +46,24 @@ fn a_file_has_the_bits_of_the_same_joints_one_by_one() {
     let bits =
         |all: [[[f64; 3]; 6]; 2]| all.as_flattened().as_flattened().iter().map(|v| v.to_bits()).collect::<Vec<_>>();
     assert_eq!(bits(found), bits(expected));
+}
+
+/// Two machines whose specs differ in the file alone are different controllers: a target refuses the other one's image.
+#[test]
+fn the_digest_covers_the_joints_of_the_file() {
+    let folder = folder_with_records();
+    let record = fs::read_to_string(repository().join("specs/records/reference-forc.csv")).expect("readable");
+    fs::write(folder.path().join("records/reference-forc.csv"), record).expect("written");
+    let place = folder.path().join("specs/joints.csv");
+    let csv = fs::read_to_string(&place).expect("readable");
+    let digest = |csv: &str| {
+        fs::write(&place, csv).expect("written");
+        let compiled = compile_source(source(&with("joints = \"joints.csv\""), "spec.toml", &folder));
+        compiled.map(|compiled| compiled.ir.digest).unwrap_or_else(|refusal| panic!("{:#?}", refusal.findings))
+    };
+    let first = digest(&csv);
+    assert_eq!(first, digest(&csv.replace("81,125,2", "81.0,125.0,2.0")));
+    assert_ne!(first, digest(&csv.replace("81,125,2", "81.001,125,2")));
 }
 
 #[test]

@@ -84,7 +84,7 @@ impl Slot {
         let mut all: BTreeMap<&str, &str> = usual.iter().copied().collect();
         // A recorded run has a spec in the place of drive and grid.
         if self.name() == "specgen identify spec" {
-            all = BTreeMap::from([("record", "run.rec")]);
+            all = BTreeMap::from([("records", "run.rec")]);
         }
         all.extend(values.iter().copied());
         let mut words: Vec<String> = self.command.split(' ').skip(1).map(str::to_owned).collect();

@@ -112,7 +112,10 @@ fn run_phases(source: &SpecSource, findings: &mut Vec<Diagnostic>) -> Option<Com
     let demand = accept(demand::check(&model, setpoints.setpoints.as_ref(), &strokes), findings)?;
     findings.extend(demand.warnings);
 
-    let digest = lower::digest(&source.text, records.texts.iter().chain(&setpoints.texts));
+    let geometry = &model.geometry;
+    let joints = format!("{:?}", [geometry.base_joints, geometry.platform_joints]);
+    let joints = geometry.joint_file.clone().map(|name| (name, joints));
+    let digest = lower::digest(&source.text, records.texts.iter().chain(&setpoints.texts).chain(&joints));
     // Only a controller in task space has a design and generates set-points.
     let task = design.as_ref().zip(setpoints.setpoints);
     let assumptions = Assumptions::of(&model, records.simulated);

@@ -8,8 +8,8 @@ use crate::ir::{
     Actuation, Defaults, Gains, Hysteresis, Integrity, Path, PlatformDefaults, RateModel, Scalar, Segment, TaskSpace,
 };
 
-/// Digest of the inputs of the controller: the text of the spec (line ends as `\n`), and name and text of the files that it
-/// references. It does not depend on their folder.
+/// Digest of the inputs of the controller: the text of the spec (line ends as `\n`), and name and contents of the files that
+/// it references. It does not depend on their folder.
 pub(crate) fn digest<'a>(spec: &str, files: impl Iterator<Item = &'a (String, String)>) -> String {
     let mut all = spec.replace("\r\n", "\n").into_bytes();
     for (name, text) in files {

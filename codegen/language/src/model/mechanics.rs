@@ -69,6 +69,8 @@ section! {
         base_joints: [[f64; 3]; 6] = joints(fields)?[0];
         /// P_i in {P}, m.
         platform_joints: [[f64; 3]; 6] = joints(fields)?[1];
+        /// The file that they were read from.
+        joint_file: Option<String> = fields.name("geometry.joints").map(str::to_owned);
     }
 }
 

@@ -213,6 +213,7 @@ mod tests {
             base_joints: joints::base_joints(0.15, ANGLE),
             platform_joints: joints::platform_joints(0.1, ANGLE),
             height: 0.18,
+            joint_file: None,
         }
     }
 
