@@ -124,7 +124,7 @@ fn keys_units_choices_and_files_are_offered_and_explained() {
         let items = answer(&answers, id).as_array().unwrap();
         items.iter().map(|item| item["label"].as_str().unwrap().to_owned()).collect()
     };
-    assert_eq!(labels(2), ["m", "mm", "um", "nm"]);
+    assert_eq!(labels(2), ["m", "mm", "um", "nm", "in", "mil"]);
     assert_eq!(labels(3), ["invhys", "ewma", "pcc"]);
     assert!(labels(4).contains(&"records/reference-forc.csv".to_owned()), "{:?}", labels(4));
     // Existing keys are not offered again.

@@ -109,7 +109,8 @@ struct StudyArguments {
 }
 
 fn measure(text: &str, dimension: Dimension, unit: &str) -> Result<f64, String> {
-    let found = quantity::parse_as(text, dimension).ok().filter(|found| found.dimension == dimension && found.value > 0.0);
+    let found =
+        quantity::parse_as(text, dimension).ok().filter(|found| found.dimension == dimension && found.value > 0.0);
     found
         .map(|found| found.value)
         .ok_or_else(|| format!("expected a quantity above zero in the form \"<number> {unit}\", found `{text}`"))
