@@ -99,7 +99,7 @@ mod tests {
             (found, findings.into_diagnostics())
         };
         let (found, notes) = choose(None);
-        assert_eq!((found, notes[0].code), (Some(1), codes::RECORD_PART));
+        assert_eq!((found, notes[0].code), (Some(1), codes::RECORD_PART.id));
         for word in ["table 2 `20 Hz` (500 rows of `a` from line 8)", "3 `40 Hz`", "left out: `s` (a text)"] {
             assert!(notes[0].message.contains(word), "{}", notes[0].message);
         }
@@ -107,7 +107,7 @@ mod tests {
         assert_eq!(choose(Some("40 hz")), (Some(2), Vec::new()));
         let (found, refused) = choose(Some("4"));
         assert!(
-            found.is_none() && refused[0].code == codes::RECORD_HEADER && refused[0].message.contains("1 `R, C`"),
+            found.is_none() && refused[0].code == codes::RECORD_HEADER.id && refused[0].message.contains("1 `R, C`"),
             "{refused:?}"
         );
     }

@@ -155,7 +155,10 @@ impl Open {
 mod tests {
     use super::*;
 
-    fn found(text: &str) -> Vec<(usize, Option<usize>, usize, String, Vec<String>)> {
+    /// First and last line, rows, name and columns of a table.
+    type Found = (usize, Option<usize>, usize, String, Vec<String>);
+
+    fn found(text: &str) -> Vec<Found> {
         let all = tables(text.as_bytes()).into_iter();
         all.map(|(part, extent)| (part.from, part.last, extent.rows, extent.name, extent.columns)).collect()
     }

@@ -221,7 +221,7 @@ impl<'a> Problem<'a> {
         // absorb both. Plays and z run on: a record begins at rest, where the one before it ended.
         let starts_of = |part: usize| if part == 0 { starts } else { starts + usize::from(starts > 0) };
         let records = samples.parts.len() + 1;
-        let width = bounded + 1 + (0..records).map(starts_of).fold(0, |sum, own| sum + own);
+        let width = bounded + 1 + (0..records).map(starts_of).sum::<usize>();
         let mut fixed = Vec::with_capacity(width * samples.time.len());
         for (k, (u, t)) in samples.drive.iter().zip(&samples.time).enumerate() {
             interrupt::point();

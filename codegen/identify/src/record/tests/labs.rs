@@ -32,7 +32,7 @@ fn structs_of_dspace_are_read() {
     let y = structs("", &["Name", "Data", "XIndex"], &signals);
     let whole = structs("measured_001", &["X", "Y", "Description"], &[vec![x, y, text("", "nothing")]]);
     let names = ["drive_V=Model Root/Drive", "displacement_um=Model Root/Gauge"];
-    let record = assert_same("dSPACE", read(&mat::file(&[whole.clone()]), &names, None));
+    let record = assert_same("dSPACE", read(&mat::file(std::slice::from_ref(&whole)), &names, None));
     assert!(record.warnings.is_empty(), "{:?}", record.warnings);
     let found = read(&mat::file(&[whole]), &[], None).unwrap_err();
     assert!(found[0].message.contains("`Model Root/Drive`"), "{found:?}");
