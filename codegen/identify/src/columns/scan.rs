@@ -156,9 +156,9 @@ mod tests {
     use super::*;
 
     /// First and last line, rows, name and columns of a table.
-    type Found = (usize, Option<usize>, usize, String, Vec<String>);
+    type Table = (usize, Option<usize>, usize, String, Vec<String>);
 
-    fn found(text: &str) -> Vec<Found> {
+    fn found(text: &str) -> Vec<Table> {
         let all = tables(text.as_bytes()).into_iter();
         all.map(|(part, extent)| (part.from, part.last, extent.rows, extent.name, extent.columns)).collect()
     }
