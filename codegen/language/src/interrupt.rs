@@ -67,7 +67,8 @@ pub fn catch(end: impl Fn() -> u8 + Send + 'static) {
 fn leave(end: &impl Fn() -> u8) -> ! {
     let _whole = whole();
     let passing = locked(&PASSING);
-    for one in passing.iter().rev() {
+    // Twice: a thread of the command may still write a file into a folder after it was removed.
+    for one in passing.iter().rev().chain(passing.iter().rev()) {
         // A compiler that was interrupted as well may still be writing or removing its last files.
         let changes = || matches!(one, TemporaryPath::Tree(path) if path.exists());
         for _ in 0..100 {
