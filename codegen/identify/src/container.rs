@@ -134,7 +134,9 @@ fn tables(contents: Contents) -> Tables {
     let mut left_out: Vec<String> = Vec::new();
     let mut of_length: BTreeMap<usize, Vec<Channels>> = BTreeMap::new();
     for (order, array) in contents.arrays.into_iter().enumerate() {
-        match length_and_width(&array.size).filter(|[length, width]| length * width == array.values.len()) {
+        match length_and_width(&array.size)
+            .filter(|[length, width]| length.checked_mul(*width) == Some(array.values.len()))
+        {
             Some([length, width]) => of_length.entry(length).or_default().push(Channels { order, width, array }),
             // In a struct such numbers describe its arrays.
             None if array.group.is_empty() => left_out.push(format!("`{}` ({})", array.name, array.in_words())),

@@ -153,6 +153,11 @@ fn read_text(path: &Path, findings: &mut Findings) -> Option<String> {
         Unpacked::Tables(kind, file) => {
             let mut text = Vec::new();
             let lines = table(kind, file, None, findings)?.lines();
+            if !findings.is_empty() {
+                let message = "has several tables, or parts that are no numbers".to_owned();
+                let help = "save one table as CSV, or the table that `specgen identify RECORD -o table.csv` makes";
+                return findings.refuse(codes::RECORD_HEADER, None, message, help);
+            }
             // Reading from memory cannot fail.
             let _ = lines.take(MAX_FILE_BYTES + 1).read_to_end(&mut text);
             if text.len() as u64 > MAX_FILE_BYTES {

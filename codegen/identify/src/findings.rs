@@ -61,6 +61,10 @@ impl Findings {
         }
     }
 
+    pub(crate) fn is_empty(&self) -> bool {
+        self.found.is_empty()
+    }
+
     /// All findings in their order, then one line for each kind that was cut.
     pub(crate) fn into_diagnostics(self) -> Vec<Diagnostic> {
         let Self { path, mut found, count, .. } = self;

@@ -1,5 +1,6 @@
 //! Selects the samples and branches of a record for the fit, and their weights.
 
+use std::borrow::Cow;
 use std::ops::Range;
 
 use super::branches::{self, Branch};
@@ -94,11 +95,23 @@ pub(crate) fn begins_at_rest(record: &Record, plane: &Plane, first: usize) -> bo
     stay > first || stay > 0 && record.time[first] - record.time[first + 1 - stay] >= REST
 }
 
+/// The first of joined records: the usable part begins in it, even if another one goes lower.
+fn first_part(record: &Record) -> Cow<'_, Record> {
+    let Some(end) = record.parts.first().copied() else { return Cow::Borrowed(record) };
+    let mut head = Record { parts: Vec::new(), ..record.clone() };
+    for column in [&mut head.time, &mut head.drive, &mut head.displacement] {
+        column.truncate(end);
+    }
+    head.weightless.truncate(end);
+    Cow::Owned(head)
+}
+
 /// Finds the usable part; refuses a record with too few reversal curves.
 pub(crate) fn usable(record: &Record, plane: &Plane, findings: &mut Findings) -> Option<RecordSpan> {
     let tolerance = AT_MINIMUM * (plane.range[1] - plane.range[0]);
-    let after_visit = branches::first_usable(record, tolerance);
-    let Some(first) = unknown_start(record, plane, after_visit).or(after_visit) else {
+    let head = first_part(record);
+    let after_visit = branches::first_usable(&head, tolerance);
+    let Some(first) = unknown_start(&head, plane, after_visit).or(after_visit) else {
         let message = "the drive never rises from its minimum".to_owned();
         let help = format!(
             "start at the lowest drive, then rise to each reversal and fall back; {}",

@@ -44,10 +44,16 @@ pub fn parse(text: &str, shown_as: &str) -> Result<Vec<State>, Vec<Diagnostic>> 
     findings.conclude(states).map(|(states, _)| states)
 }
 
-/// From the unit in brackets of column `at`, from 0, to SI units: those without brackets have them. None if the unit is
+/// From the unit of column `at`, from 0, to SI units: names without a unit have them. None if the unit is
 /// not one of the coordinate, per s for a rate and per s² for an acceleration.
 fn conversion(at: usize, name: &str) -> Option<Conversion> {
-    let Some(unit) = unit_in_brackets(name) else { return Some(Conversion::unit(1.0)) };
+    // `x_um`, or nothing: then they are in SI units.
+    let behind = || {
+        let (_, unit) = name.trim().rsplit_once('_')?;
+        let coordinate = unit.split('/').next().unwrap_or_default();
+        COORDINATES[at % 6].per(coordinate).map(|_| unit.to_owned())
+    };
+    let Some(unit) = unit_in_brackets(name).or_else(behind) else { return Some(Conversion::unit(1.0)) };
     let per_time: &[&str] = match at / 6 {
         0 => &[""],
         1 => &["/s"],
@@ -74,6 +80,16 @@ mod tests {
         assert_eq!((states.len(), states[0][0][0], states[0][1][0], states[0][2][5]), (1, 0.0, 6.0, 17.0));
         let found = parse(&format!("{names}\n{}\n", row("NaN")), "s.csv").unwrap_err();
         assert!(found[0].message.contains("`c0` is `NaN`"), "{found:?}");
+    }
+
+    #[test]
+    fn units_behind_a_name_are_converted() {
+        for (at, name, factor) in
+            [(0, "x_um", 1e6), (3, "theta_x_urad", 1e6), (6, "vx_um/s", 1e6), (0, "x", 1.0), (3, "theta_x", 1.0)]
+        {
+            let found = format!("{:?}", conversion(at, name));
+            assert_eq!(found, format!("{:?}", Some(Conversion::unit(factor))), "{name}");
+        }
     }
 
     #[test]

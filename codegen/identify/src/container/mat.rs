@@ -158,7 +158,7 @@ fn add_structs(group: &str, name: &str, fields: &[String], values: Vec<Value>, c
             _ => None,
         });
         let title = title.filter(|title| !title.is_empty());
-        let is_time = name == "X" && title.is_none_or(|title| title.eq_ignore_ascii_case("time"));
+        let is_time = !group.is_empty() && name == "X" && title.is_none_or(|title| title.eq_ignore_ascii_case("time"));
         let title = if is_time { Some(TIME) } else { title }.map(str::to_owned);
         let element = if count > 1 { format!("{name}({number})") } else { name.to_owned() };
         for (field, value) in own {

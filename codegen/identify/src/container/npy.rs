@@ -24,16 +24,19 @@ pub(super) fn contents(file: &[u8]) -> Result<Contents, String> {
         rest.word()? as usize
     };
     let header = String::from_utf8_lossy(rest.take(length)?).into_owned();
-    let shape: Vec<usize> = value(&header, "shape")?
-        .trim_start_matches('(')
-        .split([',', ')'])
-        .map_while(|length| length.trim().parse().ok())
-        .collect();
+    let (shape, _) = value(&header, "shape")?.trim_start_matches('(').split_once(')').ok_or(DAMAGED)?;
+    // Python 2 wrote 1000L.
+    let lengths =
+        shape.split(',').map(|length| length.trim().trim_end_matches('L')).filter(|length| !length.is_empty());
+    let shape = lengths.map(|length| length.parse().map_err(|_| DAMAGED)).collect::<Result<Vec<usize>, _>>()?;
     let fields = fields(value(&header, "descr")?)?;
     let in_columns = value(&header, "fortran_order")?.starts_with("True");
     let count = shape.iter().try_fold(1_usize, |count, length| count.checked_mul(*length)).ok_or(DAMAGED)?;
-    let width: usize = fields.iter().map(|field| field.form.1).sum();
+    let width = fields.iter().try_fold(0_usize, |sum, field| sum.checked_add(field.form.1)).ok_or(DAMAGED)?;
     let bytes = rest.take(count.checked_mul(width).ok_or(DAMAGED)?)?;
+    if !rest.rest.is_empty() {
+        return Err("it has more than one array, or its header is damaged".to_owned());
+    }
     let mut contents = Contents::default();
     let mut at = 0;
     for Field { name, form, is_big_endian } in fields {

@@ -213,7 +213,7 @@ impl<'a> Data<'a> {
         let mut thinned = vec![false; end - first];
         let mut parts = Vec::new();
         for span in record.spans() {
-            let span = span.start.saturating_sub(first)..span.end.min(end) - first;
+            let span = span.start.saturating_sub(first)..span.end.min(end).saturating_sub(first);
             parts.push(span.start);
             let every = span.len().div_ceil(most).max(1);
             span.step_by(every).for_each(|k| thinned[k] = true);

@@ -140,7 +140,9 @@ fn words(name: &str) -> Vec<Reading> {
         let plain = known(word).into_iter().flatten().map(|symbol| (*symbol).to_owned());
         let prefixed = PREFIXES.iter().filter_map(|(prefix, short)| {
             let [symbol] = known(word.strip_prefix(prefix)?)? else { return None };
-            Some(format!("{short}{symbol}"))
+            let found = format!("{short}{symbol}");
+            // "milliinch" is no minute.
+            (units::find(&found)?.dimension == units::find(symbol)?.dimension).then_some(found)
         });
         found.extend(plain.chain(prefixed).filter_map(|symbol| Reading::of(Trust::Spelling, &symbol)));
     }

@@ -19,9 +19,9 @@ const EXAMPLE: &str = "leg,where,x_mm,y_mm,z_mm";
 /// Columns that say which joint a line is, in small letters.
 const LEGS: &[&str] = &["leg", "number", "no", "no.", "nr", "#", "id", "index"];
 const BODIES: &[&str] = &["where", "body", "part", "plate", "side", "joint", "name", "point", "label"];
-/// First letters of the names of a body: base, bottom, fixed, lower; platform, top, moving, upper.
-const BASE: [char; 4] = ['b', 'f', 'l', 'g'];
-const PLATFORM: [char; 4] = ['p', 't', 'm', 'u'];
+/// How the name of a joint begins, or its only letter.
+const BASE: (&[&str], char) = (&["base", "bottom", "fixed", "ground", "lower"], 'b');
+const PLATFORM: (&[&str], char) = (&["platform", "top", "moving", "mobile", "upper"], 'p');
 
 /// What is wrong with a file: its line, if it is one, and the help.
 struct Refusal {
@@ -64,6 +64,10 @@ struct Head<'a> {
     leg: Option<usize>,
     body: Option<usize>,
     coordinates: [(usize, &'a str); 3],
+    /// Number of columns.
+    count: usize,
+    /// Whether numbers have a decimal comma.
+    has_commas: bool,
 }
 
 /// A line of the file.
@@ -82,7 +86,9 @@ fn joints(text: &str) -> Result<[[[f64; 3]; 6]; 2], Refusal> {
     let Some((first, names)) = lines.next() else {
         return refuse(1, "the file is empty".to_owned(), format!("begin with a head such as {EXAMPLE}"));
     };
-    let head = Head::of(first, names)?;
+    let mut head = Head::of(first, names)?;
+    // Beside decimal points a comma would divide thousands.
+    head.has_commas = head.separator != ',' && !lines.clone().any(|(_, line)| line.contains('.'));
     let mut found = lines.map(|(line, text)| head.joint(line, text)).collect::<Result<Vec<Joint>, Refusal>>()?;
     if found.len() != 12 {
         let message = format!("there are {} joints, expected 12", found.len());
@@ -136,7 +142,9 @@ impl<'a> Head<'a> {
     fn of(line: usize, names: &'a str) -> Result<Self, Refusal> {
         let separator = ['\t', ';'].into_iter().find(|separator| names.contains(*separator)).unwrap_or(',');
         let names = cells(names, separator);
-        let called = |known: &[&str]| names.iter().position(|name| known.contains(&name.to_lowercase().as_str()));
+        // The clearest name first.
+        let called =
+            |known: &[&str]| known.iter().find_map(|one| names.iter().position(|name| name.to_lowercase() == *one));
         let coordinate = |axis: char| {
             let found = names.iter().enumerate().find_map(|(at, name)| {
                 let unit = name.strip_prefix([axis, axis.to_ascii_uppercase()])?;
@@ -155,15 +163,20 @@ impl<'a> Head<'a> {
             refuse(line, format!("the column {axis} has no unit of length"), head)
         };
         let coordinates = [coordinate('x')?, coordinate('y')?, coordinate('z')?];
-        Ok(Self { separator, leg: called(LEGS), body: called(BODIES), coordinates })
+        let (leg, body, count) = (called(LEGS), called(BODIES), names.len());
+        Ok(Self { separator, leg, body, coordinates, count, has_commas: false })
     }
 
     fn joint(&self, line: usize, text: &str) -> Result<Joint, Refusal> {
         let cells = cells(text, self.separator);
         let cell = |at: usize| cells.get(at).copied().unwrap_or_default();
+        if cells.iter().skip(self.count).any(|cell| !cell.is_empty()) {
+            let message = "the line has more cells than the first line has names".to_owned();
+            return refuse(line, message, "write decimal points, or semicolons between the columns");
+        }
         let mut point = [0.0; 3];
         for (value, (at, unit)) in point.iter_mut().zip(self.coordinates) {
-            let decimal = if self.separator == ',' { cell(at).to_owned() } else { cell(at).replace(',', ".") };
+            let decimal = if self.has_commas { cell(at).replace(',', ".") } else { cell(at).to_owned() };
             // With its unit, so that it has the bits of the same text in a spec.
             let number = quantity::parse(&decimal).is_ok_and(|number| number.dimension == Dimension::NONE);
             let read = quantity::parse_as(&format!("{decimal} {unit}"), Dimension::LENGTH).ok().filter(|_| number);
@@ -177,11 +190,15 @@ impl<'a> Head<'a> {
             let name = cell(at);
             name.split_at(name.trim_end_matches(|c: char| c.is_ascii_digit()).len())
         });
-        let is_platform = match name.chars().next().map(|letter| letter.to_ascii_lowercase()) {
-            None => None,
-            Some(letter) if BASE.contains(&letter) => Some(false),
-            Some(letter) if PLATFORM.contains(&letter) => Some(true),
-            Some(_) => {
+        let plain = name.trim_end_matches([' ', '_', '-']).to_lowercase();
+        let is = |(words, letter): (&[&str], char)| {
+            words.iter().any(|word| plain.starts_with(word)) || plain.chars().eq([letter])
+        };
+        let is_platform = match plain.as_str() {
+            "" => None,
+            _ if is(BASE) => Some(false),
+            _ if is(PLATFORM) => Some(true),
+            _ => {
                 let message = format!("`{}` is neither base nor platform", text::shorten(name));
                 return refuse(line, message, "write base or platform, or B0 to B5 and P0 to P5");
             }
@@ -249,6 +266,10 @@ mod tests {
                 }),
             ),
             (
+                "a column of numbers that is called joint",
+                file("joint,where,x_mm,y_mm,z_mm", 0, |leg, top, [x, y, z]| format!("{leg},{},{x},{y},{z}", body(top))),
+            ),
+            (
                 "metres",
                 file("# CAD\nleg,where,x_m,y_m,z_m", 0, |leg, top, point| {
                     format!("{leg},{},{}", body(top), point.map(|v| v + "e-3").join(","))
@@ -275,6 +296,10 @@ mod tests {
             (plain.replace("0,base", "0,arm"), Some(2), "`arm` is neither"),
             (plain.replace("1,base", "2,base"), None, "the base has no joint of leg 1"),
             (plain.replace("5,base", "5,platform"), None, "the base has no joint of leg 5"),
+            (plain.replace("0,base", "0,machine"), Some(2), "`machine` is neither"),
+            (plain.replace("0,base,150", "0,base,150,5"), Some(2), "more cells than"),
+            (plain.replace("0,base,150", "0,base,\"150,5\""), Some(2), "more cells than"),
+            (plain.replace(',', ";").replace("0;base;150", "0;base;1,234"), Some(2), "`1,234` is no coordinate"),
             (without_last, None, "there are 11 joints"),
         ] {
             let refused = joints(&text).err().unwrap_or_else(|| panic!("{text}"));

@@ -56,6 +56,9 @@ pub fn run(
     let grid = grid.or(choice.as_ref().map(|c| c.chosen)).unwrap_or_default();
     let finest = if choice.is_some() { identify::MAX_GRID } else { grid };
     let options = identify::Options { dead_time, finest, ..identify::Options::new(grid, drive) };
+    if let Some(record) = &validation {
+        ui.findings(None, &record.warnings);
+    }
     let error = validation.as_ref().map(identify::error_on);
     let error = error.as_ref().map(|error| error as &Selection<'_>);
     let chosen = choose(&record, error, &options, model).map_err(refused)?;
