@@ -79,10 +79,13 @@ fn read_objects(mut from: Bytes, objects: &mut Vec<Object>, listed: &mut Vec<usi
         }
         // Properties: a name, a type, a value.
         for _ in 0..from.word()? {
-            text(&mut from)?;
+            let name = text(&mut from)?;
             match from.word()? {
                 TEXT => {
-                    text(&mut from)?;
+                    let value = text(&mut from)?;
+                    if name == "NI_Scaling_Status" && value == "unscaled" {
+                        return Err("its channels are raw numbers of the acquisition: save them scaled".to_owned());
+                    }
                 }
                 kind => {
                     from.take(width(kind)?)?;
@@ -175,6 +178,19 @@ mod tests {
         let lengths = [long((objects.len() + values.len()) as u64), long(objects.len() as u64)].concat();
         let version = word(4713);
         [b"TDSm", &has.to_le_bytes()[..], &version, &lengths, &objects, values].concat()
+    }
+
+    #[test]
+    fn channels_that_are_not_scaled_are_refused() {
+        let word = |value: u32| value.to_le_bytes().to_vec();
+        let text = |text: &str| [word(text.len() as u32), text.as_bytes().to_vec()].concat();
+        let property = |status: &str| [text("NI_Scaling_Status"), word(TEXT), text(status)].concat();
+        let read = |status: &str| {
+            let object = [word(1), text("/'scan'/'a'"), word(u32::MAX), word(1), property(status)].concat();
+            read_objects(Bytes { rest: &object, is_big_endian: false }, &mut Vec::new(), &mut Vec::new())
+        };
+        assert_eq!(read("scaled"), Ok(()));
+        assert!(read("unscaled").unwrap_err().contains("save them scaled"));
     }
 
     #[test]
