@@ -113,8 +113,8 @@ fn run_phases(source: &SpecSource, findings: &mut Vec<Diagnostic>) -> Option<Com
     findings.extend(demand.warnings);
 
     let geometry = &model.geometry;
-    let joints = format!("{:?}", [geometry.base_joints, geometry.platform_joints]);
-    let joints = geometry.joint_file.clone().map(|name| (name, joints));
+    let joints = || format!("{:?}", [geometry.base_joints, geometry.platform_joints]);
+    let joints = geometry.joint_file.clone().map(|name| (name, joints()));
     let digest = lower::digest(&source.text, records.texts.iter().chain(&setpoints.texts).chain(&joints));
     // Only a controller in task space has a design and generates set-points.
     let task = design.as_ref().zip(setpoints.setpoints);

@@ -30,7 +30,10 @@ pub fn join(records: &[Record], drive: [f64; 2]) -> Result<Record, Vec<Diagnosti
         match findings.conclude(part) {
             Ok((part, found)) => {
                 warnings.extend(found);
-                all = Some(all.map_or_else(|| part.clone(), |all| append(all, &part)));
+                all = Some(match all {
+                    Some(all) => append(all, &part),
+                    None => part,
+                });
             }
             Err(found) => refused.extend(found),
         }
@@ -47,18 +50,15 @@ fn usable_part(record: &Record, plane: &Plane, further: bool, findings: &mut Fin
     if findings.any_error() {
         return None;
     }
-    let mut record = defects::repaired(record, plane.range, plane.grid, findings);
-    if further {
-        let first = selection::usable(&record, plane, findings)?.first;
-        if !selection::begins_at_rest(&record, plane, first) {
-            rest_unknown(&record, first, findings);
-        }
-        record.time.drain(..first);
-        record.drive.drain(..first);
-        record.displacement.drain(..first);
-        record.weightless.drain(..first);
+    let record = defects::repaired(record, plane.range, plane.grid, findings);
+    if !further {
+        return Some(record);
     }
-    Some(record)
+    let first = selection::usable(&record, plane, findings)?.first;
+    if !selection::begins_at_rest(&record, plane, first) {
+        rest_unknown(&record, first, findings);
+    }
+    Some(record.part(first..record.time.len()))
 }
 
 /// Warns of a record whose first used sample, `first`, does not follow a rest.

@@ -81,6 +81,15 @@ impl Record {
         if self.monitored { 0.0 } else { self.spans().fold(0.0, longest) }
     }
 
+    /// Some of the samples of a single record.
+    pub(crate) fn part(&self, span: Range<usize>) -> Self {
+        let of = |column: &[f64]| column[span.clone()].to_vec();
+        let (time, drive, displacement) = (of(&self.time), of(&self.drive), of(&self.displacement));
+        let (weightless, parts) = (self.weightless[span].to_vec(), Vec::new());
+        let (shown_as, warnings) = (self.shown_as.clone(), self.warnings.clone());
+        Self { shown_as, time, drive, displacement, weightless, parts, warnings, ..*self }
+    }
+
     /// The samples of each record that this one was joined from, in order.
     pub(crate) fn spans(&self) -> impl Iterator<Item = Range<usize>> + '_ {
         let firsts = [0].into_iter().chain(self.parts.iter().copied());

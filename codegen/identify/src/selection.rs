@@ -97,13 +97,7 @@ pub(crate) fn begins_at_rest(record: &Record, plane: &Plane, first: usize) -> bo
 
 /// The first of joined records: the usable part begins in it, even if another one goes lower.
 fn first_part(record: &Record) -> Cow<'_, Record> {
-    let Some(end) = record.parts.first().copied() else { return Cow::Borrowed(record) };
-    let mut head = Record { parts: Vec::new(), ..record.clone() };
-    for column in [&mut head.time, &mut head.drive, &mut head.displacement] {
-        column.truncate(end);
-    }
-    head.weightless.truncate(end);
-    Cow::Owned(head)
+    record.parts.first().map_or(Cow::Borrowed(record), |end| Cow::Owned(record.part(0..*end)))
 }
 
 /// Finds the usable part; refuses a record with too few reversal curves.
