@@ -206,12 +206,9 @@ impl Run {
         for ((line, row), sample) in lines.zip(self.trace.rows()).zip(&self.tracking.samples) {
             // Writing to a String cannot fail, here and below.
             let _ = write!(out, "{line},{:.9}", sample.time);
-            for target in sample.target {
-                let _ = write!(out, ",{target:.6e}");
-            }
-            for (target, measured) in sample.target.iter().zip(sample.measured) {
-                let _ = write!(out, ",{:.6e}", target - measured);
-            }
+            out.extend(sample.target.iter().map(|target| format!(",{target:.6e}")));
+            let errors = sample.target.iter().zip(sample.measured).map(|(target, measured)| target - measured);
+            out.extend(errors.map(|error| format!(",{error:.6e}")));
             let word = status.and_then(|place| row.get(inputs + place)).copied().unwrap_or_default();
             let _ = writeln!(out, ",{}", status_words(word as u32));
         }

@@ -95,15 +95,11 @@ impl Description {
     /// The lines that [`Description::parse`] reads.
     #[must_use]
     pub fn to_text(&self) -> String {
+        let (name, digest, version, bits) = (&self.name, &self.digest, &self.version, self.scalar.bits());
+        let (config, inputs) = (self.config_names.join(","), self.input_names.join(","));
+        let outputs = self.output_names.join(",");
         format!(
-            "name={}\ndigest={}\nversion={}\nscalar_bits={}\nconfig_names={}\ninput_names={}\noutput_names={}\n",
-            self.name,
-            self.digest,
-            self.version,
-            self.scalar.bits(),
-            self.config_names.join(","),
-            self.input_names.join(","),
-            self.output_names.join(",")
+            "name={name}\ndigest={digest}\nversion={version}\nscalar_bits={bits}\nconfig_names={config}\ninput_names={inputs}\noutput_names={outputs}\n"
         )
     }
 

@@ -84,9 +84,7 @@ impl TrackingTable {
         out.push_str(",seconds,path_seconds\n");
         for row in &self.rows {
             let _ = write!(out, "{},{},{:.4},{:.4}", row.mode, row.frequency_hz, row.rmse_nm, row.peak_nm);
-            for value in row.leg_rmse_nm {
-                let _ = write!(out, ",{value:.4}");
-            }
+            out.extend(row.leg_rmse_nm.iter().map(|value| format!(",{value:.4}")));
             let Coverage { seconds, path_seconds } = row.coverage;
             let _ = writeln!(out, ",{seconds:.6},{path_seconds:.6}");
         }
@@ -107,9 +105,7 @@ impl TrackingTable {
             }
         }
         let mut out = String::from("nm rms  ");
-        for frequency in &frequencies {
-            let _ = write!(out, "{:>12}", format!("{frequency} Hz"));
-        }
+        out.extend(frequencies.iter().map(|frequency| format!("{:>12}", format!("{frequency} Hz"))));
         for mode in modes {
             let _ = write!(out, "\n{mode:<8}");
             for frequency in &frequencies {

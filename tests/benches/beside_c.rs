@@ -5,7 +5,6 @@
 //! this computer with products and sums fused. Times are the least of many rounds over 1,024 motions, Rust and C by turns.
 
 use std::cell::RefCell;
-use std::fmt::Write as _;
 use std::ops::{Add, Div, Mul, Neg, Sub};
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -164,13 +163,11 @@ fn traced(platform: &Platform<Number>) -> String {
     let forces = platform.leg_forces(&motion);
     let mut c = "static void kernel(const double *restrict in, double *restrict out) {\n".to_owned();
     LINES.with_borrow(|lines| {
-        for (place, expression) in lines.iter().enumerate() {
-            let _ = writeln!(c, "  const double v{place} = {expression};");
-        }
+        c.extend(
+            lines.iter().enumerate().map(|(place, expression)| format!("  const double v{place} = {expression};\n")),
+        );
     });
-    for (leg, force) in forces.into_iter().enumerate() {
-        let _ = writeln!(c, "  out[{leg}] = {};", force.text());
-    }
+    c.extend(forces.into_iter().enumerate().map(|(leg, force)| format!("  out[{leg}] = {};\n", force.text())));
     c.push_str("}\n");
     c
 }

@@ -96,7 +96,7 @@ pub fn hold(file: &Path, step: usize, mut run: impl FnMut(&Case) -> String) {
         lines.push(found);
     }
     if is_new {
-        let text = fs::read_to_string(file).expect("it was read");
+        let text = fs::read_to_string(file).unwrap();
         let mut lines = lines.into_iter();
         let block = |block: &str| {
             let given: String =
@@ -105,7 +105,7 @@ pub fn hold(file: &Path, step: usize, mut run: impl FnMut(&Case) -> String) {
             came.map_or(given.clone(), |came| format!("{given}{came}\n"))
         };
         let blocks: Vec<String> = text.trim_end().split("\n\n").map(block).collect();
-        fs::write(file, blocks.join("\n")).expect("the repository is writable");
+        fs::write(file, blocks.join("\n")).unwrap();
         return;
     }
     let count = stale.len();

@@ -81,29 +81,25 @@ fn the_page_says_what_a_tick_of_six_legs_costs() {
     let [[m7, m7_single, m4f], [stack, stack_single, stack_m4f]] = [step, "bytes of stack"].map(of_each);
     let tracking = |what: &str| figure("M7 f64", what);
     let hostile = |what: &str| figure("M7 f64, hostile, invhys", what);
+    let (tracked, hostile_tick) = (tracking(LONGEST), hostile(LONGEST));
+    let overflow = figure("M7 f64, overflow", LONGEST);
+    let (mean, most, leg) = (tracking(INVERSE_MEAN), tracking(INVERSE_MOST), tracking(leg));
+    let (longest, hostile_most) = (tracking(longest_leg), hostile(INVERSE_MOST));
+    let hostile_longest = hostile(longest_leg);
     figures::shown(
         "figures.md",
         &[
             format!(
-                "| inverse Preisach, one leg, N = 32, M7 f64 | tracking {} instructions mean, {} worst; with converter and memory {} and {}; \
-             hostile record {} and {} at worst | `… budgets -- --nocapture` |",
-                tracking(INVERSE_MEAN),
-                tracking(INVERSE_MOST),
-                tracking(leg),
-                tracking(longest_leg),
-                hostile(INVERSE_MOST),
-                hostile(longest_leg)
+                "| inverse Preisach, one leg, N = 32, M7 f64 | tracking {mean} instructions mean, {most} worst; with converter and memory {leg} and {longest}; \
+             hostile record {hostile_most} and {hostile_longest} at worst | `… budgets -- --nocapture` |"
             ),
             format!(
                 "| leg feed-forward, whole tick, pose to six voltages, PCC (rustc 1.95) | M7 f64 {m7} instructions mean; M7 f32 {m7_single}; \
              M4F f32 {m4f}; stack, static bound, {stack}, {stack_single}, {stack_m4f} bytes | `… budgets -- --nocapture` |"
             ),
             format!(
-                "| the same, worst tick, M7 f64, rustc 1.95 | tracking {}; hostile record {}; all six reversal memories overflowing in one tick {} \
-             (65 nested loops a leg) | same |",
-                tracking(LONGEST),
-                hostile(LONGEST),
-                figure("M7 f64, overflow", LONGEST)
+                "| the same, worst tick, M7 f64, rustc 1.95 | tracking {tracked}; hostile record {hostile_tick}; all six reversal memories overflowing in one tick {overflow} \
+             (65 nested loops a leg) | same |"
             ),
         ],
     );

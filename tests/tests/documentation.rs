@@ -67,16 +67,16 @@ const BANNED_TYPES: [&str; 40] = [
     "Said", "Seen", "Shown", "Told", "Tried", "Wanted",
 ];
 
-/// Texts of the Markdown files below a folder, by path from the repository.
-fn markdown(folder: &Path, found: &mut Vec<(String, String)>) {
+/// Texts of the files with this ending below a folder, by path from the repository.
+fn texts_in(folder: &Path, ending: &str, found: &mut Vec<(String, String)>) {
     for entry in fs::read_dir(folder).unwrap() {
         let path = entry.unwrap().path();
         let name = path.file_name().unwrap().to_str().unwrap();
         if path.is_dir() {
             if !name.starts_with('.') && !["target", "out"].contains(&name) {
-                markdown(&path, found);
+                texts_in(&path, ending, found);
             }
-        } else if name.ends_with(".md") {
+        } else if name.ends_with(ending) {
             let place = path.strip_prefix(repository()).unwrap().to_str().unwrap().to_owned();
             found.push((place, fs::read_to_string(&path).unwrap()));
         }
@@ -86,7 +86,7 @@ fn markdown(folder: &Path, found: &mut Vec<(String, String)>) {
 
 fn pages(folder: &str) -> Vec<(String, String)> {
     let mut found = Vec::new();
-    markdown(&repository().join(folder), &mut found);
+    texts_in(&repository().join(folder), ".md", &mut found);
     found
 }
 
@@ -191,23 +191,6 @@ fn the_table_of_contents_has_every_page_once() {
     assert_eq!(once, there);
 }
 
-/// Texts of the Rust files below a folder, by path from the repository.
-fn sources(folder: &Path, found: &mut Vec<(String, String)>) {
-    for entry in fs::read_dir(folder).unwrap() {
-        let path = entry.unwrap().path();
-        let name = path.file_name().unwrap().to_str().unwrap();
-        if path.is_dir() {
-            if !name.starts_with('.') && !["target", "out"].contains(&name) {
-                sources(&path, found);
-            }
-        } else if name.ends_with(".rs") {
-            let place = path.strip_prefix(repository()).unwrap().to_str().unwrap().to_owned();
-            found.push((place, fs::read_to_string(&path).unwrap()));
-        }
-    }
-    found.sort();
-}
-
 /// Comments and string literals of a line of Rust; code is left out.
 fn texts(line: &str) -> String {
     let (code, comment) = line.split_once("//").map_or((line, ""), |(code, comment)| (code, comment));
@@ -233,7 +216,7 @@ fn sources_use_plain_words() {
     let mut found = Vec::new();
     for folder in PLAIN {
         let mut files = Vec::new();
-        sources(&repository().join(folder), &mut files);
+        texts_in(&repository().join(folder), ".rs", &mut files);
         assert!(files.len() > 5, "{folder}");
         for (name, text) in files {
             found.extend(banned_in_source(&text).into_iter().map(|(line, word)| format!("{name}:{line}: {word}")));
@@ -246,7 +229,7 @@ fn sources_use_plain_words() {
 fn types_have_nouns_as_names() {
     let (mut files, mut found) = (Vec::new(), Vec::new());
     for folder in ["codegen", "examples", "firmware", "host-sim", "tests", "xtask"] {
-        sources(&repository().join(folder), &mut files);
+        texts_in(&repository().join(folder), ".rs", &mut files);
     }
     assert!(files.len() > 1000, "{}", files.len());
     for (name, text) in files {

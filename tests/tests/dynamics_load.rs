@@ -105,12 +105,9 @@ fn what_the_first_order_leaves_is_within_its_bound_and_near_it() {
         let (load, affine) = (case.load(), first_order(case.load()));
         for (what, bound) in ["moves", "stops", "streams"].into_iter().zip(&load.bounds) {
             let worst = case.worst(&affine, bound);
+            let (name, bound_nm, worst_nm, load) = (&case.name, bound.error * 1e9, worst * 1e9, bound.load * 1e9);
             println!(
-                "{}, {what}: off by {:.4} nm at most, found {:.4} nm; load up to {:.1} nm",
-                case.name,
-                bound.error * 1e9,
-                worst * 1e9,
-                bound.load * 1e9
+                "{name}, {what}: off by {bound_nm:.4} nm at most, found {worst_nm:.4} nm; load up to {load:.1} nm"
             );
             assert!(worst <= bound.error, "{}, {what}: {worst:e} beyond {:e}", case.name, bound.error);
             assert!(bound.error < 2.5 * worst, "{}, {what}: {worst:e} is far below {:e}", case.name, bound.error);

@@ -65,6 +65,21 @@ fn changed(change: impl FnOnce(&mut Vec<[f64; 3]>)) -> String {
     csv(&rows)
 }
 
+/// The good record with every sample changed.
+fn each(change: impl FnMut(&mut [f64; 3])) -> String {
+    changed(|rows| rows.iter_mut().for_each(change))
+}
+
+/// The record of an actuator of 0.5 um/V under `drive`.
+fn straight(drive: &Drive) -> String {
+    csv(&drive.time().iter().zip(&drive.samples).map(|(t, u)| [*t, *u, 0.5 * u]).collect::<Vec<_>>())
+}
+
+/// Asserts that the record `text` is refused, and returns the line of the finding.
+fn refused(text: &str, code: &str, words: &str) -> Option<usize> {
+    expect(&errors(text.as_bytes()), code, words)
+}
+
 #[test]
 fn the_good_record_is_accepted() {
     let record = read(csv(&good()).as_bytes()).unwrap();
@@ -84,21 +99,14 @@ fn byte_order_mark_windows_lines_comments_and_column_order_are_accepted() {
 
 #[test]
 fn files_that_are_no_text() {
-    expect(
-        &read_record(Path::new("no/such/file.csv"), "record.csv", &Reading::default()).unwrap_err(),
-        "E0501",
-        "cannot be read",
-    );
-    expect(
-        &read_record(&std::env::temp_dir(), "record.csv", &Reading::default()).unwrap_err(),
-        "E0501",
-        "cannot be read",
-    );
-    expect(&errors(b""), "E0504", "is empty");
-    expect(&errors(b"\n\n"), "E0504", "is empty");
+    for path in [Path::new("no/such/file.csv"), &std::env::temp_dir()] {
+        expect(&read_record(path, "record.csv", &Reading::default()).unwrap_err(), "E0501", "cannot be read");
+    }
+    refused("", "E0504", "is empty");
+    refused("\n\n", "E0504", "is empty");
     assert_eq!(expect(&errors(b"time_s,drive_V,displacement_um\n0,1,\xff\n"), "E0503", "0xff"), Some(2));
     assert_eq!(expect(&errors(b"\x7fELF\x00\x01"), "E0503", "0x00"), Some(1));
-    expect(&errors(b"time_s,drive_V,displacement_um\n"), "E0509", "has 0 samples");
+    refused("time_s,drive_V,displacement_um\n", "E0509", "has 0 samples");
 }
 
 #[test]
@@ -116,7 +124,7 @@ fn a_huge_file_that_is_no_text_is_refused_without_reading_it_whole() {
 #[test]
 fn columns() {
     let text = csv(&good());
-    expect(&errors(text.replacen("drive_V", "drve_V", 1).as_bytes()), "E0504", "`drive_V` is missing");
+    refused(&text.replacen("drive_V", "drve_V", 1), "E0504", "`drive_V` is missing");
     let all = errors(text.replacen("displacement_um", "displacement_inch", 1).as_bytes());
     assert!(all[0].help.contains("`displacement_nm`"), "{all:?}");
     let all = errors(text.replacen("time_s,drive_V,displacement_um", "a,b,c", 1).as_bytes());
@@ -146,12 +154,9 @@ fn bad_numbers_are_all_reported_with_line_and_column_and_counted() {
 
 #[test]
 fn time() {
-    assert_eq!(expect(&errors(changed(|r| r[40][0] = r[39][0]).as_bytes()), "E0510", "must increase"), Some(42));
-    expect(&errors(changed(|r| r.iter_mut().for_each(|r| r[0] = -r[0])).as_bytes()), "E0510", "must increase");
-    let gap = changed(|r| {
-        r.drain(300..350);
-    });
-    let record = read(gap.as_bytes()).unwrap();
+    assert_eq!(refused(&changed(|r| r[40][0] = r[39][0]), "E0510", "must increase"), Some(42));
+    refused(&each(|r| r[0] = -r[0]), "E0510", "must increase");
+    let record = read(changed(|r| drop(r.drain(300..350))).as_bytes()).unwrap();
     assert_eq!((record.time[0], record.warnings[0].code), (3.5, "N0523"), "{:?}", record.warnings);
     assert!(record.warnings[0].message.contains("0 s to 2.99 s"), "{:?}", record.warnings);
     let mut k = 0;
@@ -161,67 +166,44 @@ fn time() {
             k % 100 <= 60
         });
     });
-    assert_eq!(expect(&errors(bursts.as_bytes()), "E0511", "between 0.59 s and 0.99 s"), Some(62));
-    expect(&errors(changed(|r| r.truncate(50)).as_bytes()), "E0509", "has 50 samples");
+    assert_eq!(refused(&bursts, "E0511", "between 0.59 s and 0.99 s"), Some(62));
+    refused(&changed(|r| r.truncate(50)), "E0509", "has 50 samples");
 }
 
 #[test]
 fn signals_that_do_not_move_or_do_not_fit() {
-    expect(&errors(changed(|r| r.iter_mut().for_each(|r| r[1] = 3.0)).as_bytes()), "E0512", "`drive_V` is 3");
-    expect(&errors(changed(|r| r.iter_mut().for_each(|r| r[2] = 3.0)).as_bytes()), "E0512", "`displacement_um` is 3");
-    expect(
-        &errors(changed(|r| r.iter_mut().for_each(|r| r[2] = r[2].min(40.0))).as_bytes()),
-        "E0513",
-        "is limited at 40",
-    );
-    expect(&errors(changed(|r| r[200..300].iter_mut().for_each(|r| r[2] = 9.0)).as_bytes()), "E0513", "is stuck at 9");
-    expect(
-        &errors(changed(|r| r.iter_mut().for_each(|r| r[2] = -r[2])).as_bytes()),
-        "E0514",
-        "falls when the drive rises",
-    );
+    refused(&each(|r| r[1] = 3.0), "E0512", "`drive_V` is 3");
+    refused(&each(|r| r[2] = 3.0), "E0512", "`displacement_um` is 3");
+    refused(&each(|r| r[2] = r[2].min(40.0)), "E0513", "is limited at 40");
+    refused(&changed(|r| r[200..300].iter_mut().for_each(|r| r[2] = 9.0)), "E0513", "is stuck at 9");
+    refused(&each(|r| r[2] = -r[2]), "E0514", "falls when the drive rises");
     let mut random = generator(1);
-    let mut noise = || (random.next_u64() >> 40) as f64 * 1e-6;
-    expect(&errors(changed(|r| r.iter_mut().for_each(|r| r[2] = noise())).as_bytes()), "E0514", "hardly follows");
+    refused(&each(|r| r[2] = (random.next_u64() >> 40) as f64 * 1e-6), "E0514", "hardly follows");
 }
 
 #[test]
 fn wrong_units_and_swapped_columns() {
-    expect(&errors(changed(|r| r.iter_mut().for_each(|r| r[1] *= 1e3)).as_bytes()), "E0603", "in mV?");
-    expect(&errors(changed(|r| r.iter_mut().for_each(|r| r[1] *= 1e-3)).as_bytes()), "E0603", "in kV?");
+    refused(&each(|r| r[1] *= 1e3), "E0603", "in mV?");
+    refused(&each(|r| r[1] *= 1e-3), "E0603", "in kV?");
     // The displacement of 60 um stands in the drive column, the 100 V in the other.
-    expect(
-        &errors(changed(|r| r.iter_mut().for_each(|r| r.swap(1, 2))).as_bytes()),
-        "E0604",
-        "table is to cover 0 V to 100 V",
-    );
-    let record = read(changed(|r| r.iter_mut().for_each(|r| r[2] *= 1e3)).as_bytes()).unwrap();
+    refused(&each(|r| r.swap(1, 2)), "E0604", "table is to cover 0 V to 100 V");
+    let record = read(each(|r| r[2] *= 1e3).as_bytes()).unwrap();
     assert!(record.warnings.iter().any(|d| d.code == "W0515" && d.message.contains("in nm?")), "{:?}", record.warnings);
     assert!(record.warnings.iter().all(|d| d.severity == Severity::Warning));
 }
 
 #[test]
 fn records_that_do_not_cover_the_plane() {
-    let narrow = Drive::at(0.0, 100.0).reversal_curves(8, [0.0, 60.0], 50.0);
-    let rows: Vec<_> = narrow.time().iter().zip(&narrow.samples).map(|(t, u)| [*t, *u, 0.5 * u]).collect();
-    expect(&errors(csv(&rows).as_bytes()), "E0606", "no cell with an up_threshold above 60 V");
-    let high = Drive::at(40.0, 100.0).reversal_curves(8, [40.0, 100.0], 50.0);
-    let rows: Vec<_> = high.time().iter().zip(&high.samples).map(|(t, u)| [*t, *u, 0.5 * u]).collect();
-    expect(&errors(csv(&rows).as_bytes()), "E0606", "no cell with a down_threshold below 40 V");
-    let wide = Drive::at(0.0, 100.0).reversal_curves(8, [0.0, 150.0], 50.0);
-    let rows: Vec<_> = wide.time().iter().zip(&wide.samples).map(|(t, u)| [*t, *u, 0.5 * u]).collect();
-    expect(
-        &errors(csv(&rows).as_bytes()),
-        "E0605",
-        "to 150 V (at 24.04 s), but the table is to cover 0 V to 100 V; it leaves that range at 13.33 s",
-    );
-    let one = Drive::at(0.0, 100.0).reversal_curves(1, RANGE, 50.0);
-    let rows: Vec<_> = one.time().iter().zip(&one.samples).map(|(t, u)| [*t, *u, 0.5 * u]).collect();
-    expect(&errors(csv(&rows).as_bytes()), "E0607", "1 reversal curves");
+    let curves = |count, range: [f64; 2]| straight(&Drive::at(range[0], 100.0).reversal_curves(count, range, 50.0));
+    refused(&curves(8, [0.0, 60.0]), "E0606", "no cell with an up_threshold above 60 V");
+    refused(&curves(8, [40.0, 100.0]), "E0606", "no cell with a down_threshold below 40 V");
+    let wide = "to 150 V (at 24.04 s), but the table is to cover 0 V to 100 V; it leaves that range at 13.33 s";
+    refused(&curves(8, [0.0, 150.0]), "E0605", wide);
+    refused(&curves(1, RANGE), "E0607", "1 reversal curves");
     let rise: Vec<_> = (0..200).map(|k| [f64::from(k) * 0.01, f64::from(k) * 0.5, f64::from(k) * 0.3]).collect();
-    expect(&errors(csv(&rise).as_bytes()), "E0607", "0 reversal curves");
+    refused(&csv(&rise), "E0607", "0 reversal curves");
     let fall: Vec<_> = rise.iter().map(|[t, u, y]| [*t, 99.5 - u, 60.0 - y]).collect();
-    expect(&errors(csv(&fall).as_bytes()), "E0607", "never rises");
+    refused(&csv(&fall), "E0607", "never rises");
 }
 
 #[test]
@@ -229,15 +211,9 @@ fn a_part_of_the_plane_that_no_curve_enters_is_named() {
     // No reversal between 25 V and 75 V: cells in that band of up_thresholds always switch off together.
     let drive = [6.25, 12.5, 18.75, 25.0, 75.0, 81.25, 87.5, 93.75, 100.0];
     let drive = drive.iter().fold(Drive::at(0.0, 100.0), |drive, top| drive.ramp(*top, 50.0).ramp(0.0, 50.0));
-    let rows: Vec<_> = drive.time().iter().zip(&drive.samples).map(|(t, u)| [*t, *u, 0.5 * u]).collect();
-    let record = read(csv(&rows).as_bytes()).unwrap();
+    let record = read(straight(&drive).as_bytes()).unwrap();
     let result = identify(&record, &Options::new(16, RANGE)).unwrap();
-    let warning = result.warnings.iter().find(|d| d.code == "W0609").unwrap();
-    assert!(
-        warning.message.contains("up_threshold 25.000 to 75.000 V, down_threshold 0.000 to 68.750 V"),
-        "{}",
-        warning.message
-    );
+    expect(&result.warnings, "W0609", "up_threshold 25.000 to 75.000 V, down_threshold 0.000 to 68.750 V");
     assert!((0.3..0.7).contains(&result.report.excited_share), "{}", result.report.excited_share);
 }
 

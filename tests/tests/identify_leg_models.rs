@@ -150,15 +150,11 @@ fn two_rates_give_a_better_leg_model_than_one() {
         let choice = choose(&record, other, &Options::new(32, VOLTAGE), Kind::Auto).unwrap();
         let report = &choice.table.report;
         let errors = open_loop(&choice, &leg);
+        let (all, fast, family, dead_time) = (errors[0], errors[1], choice.family.name(), report.dead_time * 1e3);
+        let (basis, creep) = (&report.dead_time_basis, choice.model.around.map(|around| around.creep));
         println!(
-            "class {class}, {}: {:.1} nm, above 8 Hz {:.1} nm; {}, dead time {:.3} ms ({}), creep {:?}",
+            "class {class}, {}: {all:.1} nm, above 8 Hz {fast:.1} nm; {family}, dead time {dead_time:.3} ms ({basis}), creep {creep:?}",
             records[number as usize % 3],
-            errors[0],
-            errors[1],
-            choice.family.name(),
-            report.dead_time * 1e3,
-            report.dead_time_basis,
-            choice.model.around.map(|around| around.creep)
         );
         (report.dead_time, errors)
     });

@@ -18,18 +18,11 @@ fn found(record: &Record, options: &Options) -> Identification {
     let result = identify(record, options).unwrap_or_else(|d| panic!("{d:#?}"));
     assert!(result.warnings.is_empty(), "{:#?}", result.warnings);
     let r = &result.report;
+    let (record, grid, fit, most) = (&r.record, r.grid, r.fit_rms_percent, r.fit_max_percent);
+    let (within, dead_time, basis) = (r.branch_rms_percent, r.dead_time * 1e3, &r.dead_time_basis);
+    let (zero, weights, factorised) = (r.zero_weights, r.weights, r.solver_iterations);
     println!(
-        "{} N={}: fit {:.3} % rms {:.2} % max, within branches {:.3} %, dead time {:.3} ms ({}), {} of {} weights zero, {} factorisations",
-        r.record,
-        r.grid,
-        r.fit_rms_percent,
-        r.fit_max_percent,
-        r.branch_rms_percent,
-        r.dead_time * 1e3,
-        r.dead_time_basis,
-        r.zero_weights,
-        r.weights,
-        r.solver_iterations,
+        "{record} N={grid}: fit {fit:.3} % rms {most:.2} % max, within branches {within:.3} %, dead time {dead_time:.3} ms ({basis}), {zero} of {weights} weights zero, {factorised} factorisations"
     );
     result
 }
@@ -37,12 +30,8 @@ fn found(record: &Record, options: &Options) -> Identification {
 fn predicted(table: &EverettTable, record: &Record, dead_time: f64) -> PredictionError {
     let validation = validate(table, record, dead_time).unwrap();
     let compared = validation.compared.unwrap();
-    println!(
-        "  predicts {} to {:.3} % rms; {:.0} % of the open weight on at the start",
-        record.shown_as,
-        compared.rms_percent,
-        100.0 * validation.start_on
-    );
+    let (record, rms, on) = (&record.shown_as, compared.rms_percent, 100.0 * validation.start_on);
+    println!("  predicts {record} to {rms:.3} % rms; {on:.0} % of the open weight on at the start");
     compared
 }
 

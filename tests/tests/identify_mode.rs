@@ -119,13 +119,8 @@ fn a_noise_record_shows_the_resonance_where_its_bins_are_coherent() {
         writeln!(text, "{t:?},{u:?},{:?}", y * 1e6 + 0.6 * normal(&mut random)).unwrap();
     }
     let found = respond(Input::Text(&text), "noise.csv", None).unwrap_or_else(|d| panic!("{d:#?}")).value;
-    println!(
-        "{:.0} to {:.0} Hz, {:?}, left out {:?}",
-        found.band[0],
-        found.band[1],
-        found.fitted,
-        found.left_out.len()
-    );
+    let (low, high, fitted, left_out) = (found.band[0], found.band[1], found.fitted, found.left_out.len());
+    println!("{low:.0} to {high:.0} Hz, {fitted:?}, left out {left_out:?}");
     let fitted = found.fitted;
     assert!((fitted.resonance.value / 735.0 - 1.0).abs() < 0.01, "{fitted:?}");
     assert!((0.7..1.5).contains(&(fitted.damping_ratio.value / 0.015)), "{fitted:?}");

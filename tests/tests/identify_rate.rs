@@ -105,13 +105,9 @@ fn found(truth: &Truth) -> RateIdentification {
 
 fn show(report: &RateReport) {
     for option in &report.options {
-        println!(
-            "{:<18} fitted {:.3?} left out {:.3?} held out {:.3?}",
-            option.option.name(),
-            option.fitted,
-            option.left_out,
-            option.hold_out
-        );
+        let (name, fitted, left_out) = (option.option.name(), &option.fitted, &option.left_out);
+        let held_out = option.hold_out;
+        println!("{name:<18} fitted {fitted:.3?} left out {left_out:.3?} held out {held_out:.3?}");
     }
     println!("{}", report.verdict.text);
 }

@@ -80,13 +80,10 @@ fn noise_offset_drift_and_an_irregular_start_are_tolerated() {
         let worst = worst_node(&truth, &result.table);
         // Left in the branches, the drift of the longest one (1.8 s) is all that bends the table.
         assert!(worst_node(&truth, &within.table) < worst + 20.0 * NM * 1.8);
+        let (noise_nm, worst_nm, floor) = (noise / NM, worst / NM, result.report.noise_floor / NM);
+        let (drift, skipped) = (result.report.drift / NM, result.report.samples_skipped);
         println!(
-            "noise {} nm: worst node {:.2} nm, noise floor {:.2} nm, drift {:.2} nm/s, skipped {}",
-            noise / NM,
-            worst / NM,
-            result.report.noise_floor / NM,
-            result.report.drift / NM,
-            result.report.samples_skipped,
+            "noise {noise_nm} nm: worst node {worst_nm:.2} nm, noise floor {floor:.2} nm, drift {drift:.2} nm/s, skipped {skipped}"
         );
         assert!(worst < 2.0 * noise + 4.0 * NM, "worst node {} nm", worst / NM);
         assert!((result.report.noise_floor / noise - 1.0).abs() < 0.1);
@@ -129,12 +126,9 @@ fn a_record_of_random_reversals_identifies_the_table() {
     let mut y = response(&truth, Staircase::negative_saturation(range), &drive.samples);
     y.iter_mut().for_each(|y| *y += NM * normal(&mut random));
     let result = found(&drive, y, &Options::new(10, range));
-    println!(
-        "worst node {:.3} nm over {:?}, excited {}",
-        worst_node(&truth, &result.table) / NM,
-        result.report.branches,
-        result.report.excited_share
-    );
+    let (worst, branches) = (worst_node(&truth, &result.table) / NM, result.report.branches);
+    let excited = result.report.excited_share;
+    println!("worst node {worst:.3} nm over {branches:?}, excited {excited}");
     assert_eq!(result.report.branches, Branches::All);
     assert!(worst_node(&truth, &result.table) < 3.0 * NM);
 }
@@ -167,12 +161,9 @@ fn a_dead_time_is_estimated_only_where_rates_differ() {
     };
     let varied = of_rates([50.0, 400.0], DeadTime::Estimate);
     let ignored = of_rates([50.0, 400.0], DeadTime::Fixed(0.0));
-    println!(
-        "varied: {} s, {}; worst node {:.2} nm",
-        varied.report.dead_time,
-        varied.report.dead_time_basis,
-        worst_node(&truth, &varied.table) / NM
-    );
+    let (dead_time, basis) = (varied.report.dead_time, &varied.report.dead_time_basis);
+    let worst = worst_node(&truth, &varied.table) / NM;
+    println!("varied: {dead_time} s, {basis}; worst node {worst:.2} nm");
     assert!((varied.report.dead_time - lag).abs() < 0.1e-3, "{}", varied.report.dead_time);
     let (with, without) = (worst_node(&truth, &varied.table), worst_node(&truth, &ignored.table));
     assert!(5.0 * with < without, "worst node {} nm with, {} nm without the dead time", with / NM, without / NM);
@@ -265,13 +256,10 @@ fn on_a_plant_with_creep_the_fit_agrees_with_the_table_read_at_the_nodes() {
         (sum / (plant.len() - first) as f64).sqrt()
     };
     let (by_fit, by_reading) = (error(&result.table), error(&read));
+    let (left, worst_nm, fit, reading) = (returned / NM, worst / NM, by_fit / NM, by_reading / NM);
+    let basis = &result.report.dead_time_basis;
     println!(
-        "creep left at the end {:.0} nm, worst node {:.1} nm; prediction: fit {:.1} nm, read {:.1} nm; {}",
-        returned / NM,
-        worst / NM,
-        by_fit / NM,
-        by_reading / NM,
-        result.report.dead_time_basis,
+        "creep left at the end {left:.0} nm, worst node {worst_nm:.1} nm; prediction: fit {fit:.1} nm, read {reading:.1} nm; {basis}"
     );
     assert!(returned > 100.0 * NM, "the plant must creep, or the test says nothing");
     assert!(worst < 0.001 * read.node(grid, 0), "worst node {} nm", worst / NM);
@@ -308,12 +296,8 @@ fn validation_finds_the_start_and_removes_offset_and_drift() {
     for (history, share, limit) in histories {
         let found = validate(&truth, &record(history), 0.0).unwrap();
         let compared = found.compared.unwrap();
-        println!(
-            "after {history:?}: {:.3} on, {:.3} nm rms of {:.1} µm",
-            found.start_on,
-            compared.rms / NM,
-            compared.range * 1e6
-        );
+        let (on, rms, range) = (found.start_on, compared.rms / NM, compared.range * 1e6);
+        println!("after {history:?}: {on:.3} on, {rms:.3} nm rms of {range:.1} µm");
         assert!((share[0]..=share[1]).contains(&found.start_on), "{}", found.start_on);
         assert!(compared.rms < limit * NM, "{history:?}: {} nm", compared.rms / NM);
         assert!((compared.drift / -1e-7 - 1.0).abs() < 0.2, "{}", compared.drift);
@@ -414,13 +398,9 @@ fn a_grid_of_64_from_64_curves_takes_few_factorisations() {
     let y = y.iter().map(|f| f + 8.0 * NM * normal(&mut random)).collect();
     let started = Instant::now();
     let report = found(&drive, y, &Options::new(64, range)).report;
-    println!(
-        "{} of {} weights zero in {} factorisations, {:.2} s",
-        report.zero_weights,
-        report.weights,
-        report.solver_iterations,
-        started.elapsed().as_secs_f64()
-    );
+    let (zero, weights, factorised) = (report.zero_weights, report.weights, report.solver_iterations);
+    let seconds = started.elapsed().as_secs_f64();
+    println!("{zero} of {weights} weights zero in {factorised} factorisations, {seconds:.2} s");
     assert!(report.zero_weights > 100 && report.solver_iterations < 20 && report.kkt_violation < 1e-10);
 }
 

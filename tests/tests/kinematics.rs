@@ -71,11 +71,8 @@ fn f64_is_exact_to_a_femtometre_and_f32_to_50_picometres() {
     let (rounded, single) = emitted("kinematics-f32", &[WIDE, STROKE, F32], &poses);
     let error = worst(&single, &exact(&rounded));
     let with_rounding = worst(&single, &double);
-    println!(
-        "f32 against f64: {:.4} nm on the same pose, {:.4} nm with the pose rounded",
-        error * 1e9,
-        with_rounding * 1e9
-    );
+    let (same, rounded_nm) = (error * 1e9, with_rounding * 1e9);
+    println!("f32 against f64: {same:.4} nm on the same pose, {rounded_nm:.4} nm with the pose rounded");
     assert!(error <= 0.05e-9 && with_rounding <= 0.05e-9, "{error:e} m, {with_rounding:e} m");
 
     // What the difference form is for: the plain formula in f32.

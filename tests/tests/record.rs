@@ -264,14 +264,9 @@ fn on_the_microcontroller(emitted: &Emitted, bytes: &[u8]) {
     }
     assert!(closed > 3, "{closed} blocks");
     for stage in &target.stats.stages {
-        println!(
-            "{:<10} {:>6} calls, {:>6} to {:>6} instructions, mean {:.0}",
-            stage.name,
-            stage.calls,
-            stage.smallest,
-            stage.largest,
-            stage.mean()
-        );
+        let (name, calls, least, most) = (&stage.name, stage.calls, stage.smallest, stage.largest);
+        let mean = stage.mean();
+        println!("{name:<10} {calls:>6} calls, {least:>6} to {most:>6} instructions, mean {mean:.0}");
     }
     println!("{} words of a machine", machine.state_words());
     let most = |name: &str| target.stats.stage(name).unwrap().largest;

@@ -201,12 +201,8 @@ fn forward_kinematics_undoes_the_inverse_over_the_workspace() {
         }
     }
     println!("{} corrections: f64 {:.1e} m, {:.1e} rad", ir.kinematics.corrections, worst[0], worst[1]);
-    println!(
-        "{} corrections: f32 {:.4} nm, {:.4} nrad",
-        single.kinematics.corrections,
-        worst32[0] * 1e9,
-        worst32[1] * 1e9
-    );
+    let (corrections, nm, nrad) = (single.kinematics.corrections, worst32[0] * 1e9, worst32[1] * 1e9);
+    println!("{corrections} corrections: f32 {nm:.4} nm, {nrad:.4} nrad");
     assert!(worst[0] <= 1e-12 && worst[1] <= 1e-12, "{worst:?}");
     assert!(worst32[0] <= 0.1e-9 && 0.1 * worst32[1] <= 0.1e-9, "{worst32:?}");
 }

@@ -1,7 +1,6 @@
 //! The law's sensing and forward kinematics on emitted constants against the runtime with the constants of the IR, bit for bit: the
 //! emitter puts every constant where it belongs.
 
-use std::fmt::Write as _;
 use std::fs;
 use std::io::Write as _;
 use std::process::{Command, Stdio};
@@ -100,9 +99,7 @@ fn expected<T: Real>(ir: &Ir, rows: &[([T; 6], [T; 6])]) -> Vec<String> {
             let pose = if faults == 0 { gauges.pose(&readings(raw)) } else { [T::ZERO; 6] };
             let from_legs = legs.pose(&inverse, ir.kinematics.corrections as usize, displacements);
             let mut line = format!("{faults:x}");
-            for value in pose.iter().chain(&from_legs) {
-                let _ = write!(line, " {:x}", value.to_word());
-            }
+            line.extend(pose.iter().chain(&from_legs).map(|value| format!(" {:x}", value.to_word())));
             line
         })
         .collect()

@@ -1,5 +1,6 @@
 //! Every file of a user is opened by `specgen_language::files` and written by `codegen/language/src/output.rs`, which look at its kind and at
-//! what it is to the command. Whatever else opens, writes or moves a file is listed here, with its number of places and whose file it is.
+//! what it is to the command. Whatever else opens, writes or moves a file is listed in `tests/user_files.txt`, with its number of places
+//! and whose file it is.
 
 use std::path::{Path, PathBuf};
 
@@ -19,45 +20,8 @@ const DOORS: [&str; 10] = [
     "File::options()",
 ];
 
-const OWN: &str = "in a folder of the program's own";
-const SYSTEM: &str = "a file of the system";
-const OUTPUT: &str = "the output folder, which is specgen's as its manifest says";
-const DEVICE: &str = "a device or shared memory, opened without waiting";
-
-/// Places by file.
-const LISTED: &[(&str, usize, &str)] = &[
-    ("codegen/language/src/output.rs", 1, OWN),
-    ("codegen/operate/src/panel/http.rs", 1, SYSTEM),
-    ("codegen/compiler/src/workspace/contents.rs", 2, OUTPUT),
-    ("codegen/compiler/src/workspace/hold.rs", 1, OUTPUT),
-    ("codegen/compiler/src/workspace/output.rs", 5, OUTPUT),
-    ("codegen/compiler/src/workspace/output/replace.rs", 3, OUTPUT),
-    ("codegen/language/src/files.rs", 3, "the door"),
-    ("codegen/language/src/interrupt.rs", 1, OWN),
-    ("codegen/language/src/lock.rs", 2, OWN),
-    ("codegen/operate/src/doctor.rs", 1, SYSTEM),
-    ("codegen/operate/src/doctor/equipment.rs", 1, SYSTEM),
-    ("codegen/operate/src/doctor/latency.rs", 1, SYSTEM),
-    ("codegen/operate/src/pil/pipes.rs", 3, OWN),
-    ("codegen/operate/src/pil/serial.rs", 1, DEVICE),
-    ("codegen/studies/src/export.rs", 1, OWN),
-    ("codegen/studies/src/export/fmu.rs", 1, OWN),
-    ("codegen/studies/src/reproduce/embedded.rs", 1, OWN),
-    ("codegen/toolchain/src/apt.rs", 1, OWN),
-    ("codegen/toolchain/src/build.rs", 2, OWN),
-    ("codegen/toolchain/src/cache.rs", 4, OWN),
-    ("codegen/toolchain/src/cache/key.rs", 3, "of cargo's workspace and settings"),
-    ("codegen/toolchain/src/emulator.rs", 1, OWN),
-    ("codegen/toolchain/src/process.rs", 3, OWN),
-    ("codegen/toolchain/src/replay.rs", 2, OWN),
-    ("codegen/toolchain/src/trace.rs", 1, OWN),
-    ("codegen/toolchain/src/unpacked.rs", 3, OWN),
-    ("firmware/rt-pc/src/capture.rs", 2, "looked at by `outputs::check`"),
-    ("firmware/rt-pc/src/outputs.rs", 1, "the door of `rt-pc`"),
-    ("firmware/rt/src/exchange.rs", 1, DEVICE),
-    ("firmware/rt/src/exchange/mapping.rs", 2, DEVICE),
-    ("firmware/rt/src/scheduling.rs", 1, SYSTEM),
-];
+/// Places by file: path, count, whose files they are.
+const LISTED: &str = include_str!("../user_files.txt");
 
 /// Sources of what is shipped, without their tests.
 fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
@@ -104,7 +68,11 @@ fn no_file_of_a_user_is_opened_by_another_door() {
         found.extend((count > 0).then_some((name, count)));
     }
     found.sort();
-    let listed: Vec<(String, usize)> = LISTED.iter().map(|(name, count, _)| ((*name).to_owned(), *count)).collect();
+    let row = |line: &str| {
+        let mut words = line.splitn(3, ' ').map(str::to_owned);
+        (words.next().unwrap(), words.next().unwrap().parse().unwrap())
+    };
+    let listed: Vec<(String, usize)> = LISTED.lines().map(row).collect();
     let new: Vec<_> = found.iter().filter(|one| !listed.contains(one)).collect();
     assert!(new.is_empty(), "open these by specgen_language::files, write them by cli::file: {new:#?}");
     let gone: Vec<_> = listed.iter().filter(|one| !found.contains(one)).collect();

@@ -58,13 +58,9 @@ pub fn of_tests(ran: &TestResults, took: Duration) -> String {
         let _ = writeln!(results, "skipped {job}: {why}");
     }
     let passed = ran.tests.iter().filter(|(_, passed)| *passed).count();
-    format!(
-        "{passed} passed, {} failed, {} skipped, {:.0} min, sha256 {}",
-        ran.tests.len() - passed,
-        ran.skipped.len(),
-        took.as_secs_f64() / 60.0,
-        &crate::sha256(results.as_bytes())[..16],
-    )
+    let (failed, skipped, minutes) = (ran.tests.len() - passed, ran.skipped.len(), took.as_secs_f64() / 60.0);
+    let digest = &crate::sha256(results.as_bytes())[..16];
+    format!("{passed} passed, {failed} failed, {skipped} skipped, {minutes:.0} min, sha256 {digest}")
 }
 
 /// Shows the result of the last full run, and checks its age if the history is available.

@@ -4,6 +4,13 @@
 //! 3 environment (a missing tool, a full disk, a file that cannot be written); 4 a simulated run ended before the end of its
 //! path; 130 interrupted by Ctrl-C, with the best result so far if there is one.
 
+/// The options of a command from its arguments: fields that both have under one name, then the others.
+macro_rules! options {
+    ($arguments:ident => $options:ident { $($same:ident)+; $($other:ident: $value:expr,)* }) => {
+        $options { $($same: $arguments.$same.clone(),)+ $($other: $value,)* }
+    };
+}
+
 mod build;
 mod cache;
 mod check;

@@ -4,7 +4,7 @@ use std::fs;
 
 use serde_json::{Value, json};
 
-use crate::support::{Folder, Run, length, repository};
+use crate::support::{Folder, Run, cases, length, repository};
 use specgen::diagnostic::{Diagnostic, Severity};
 use specgen::spec::{self, SpecSource};
 use specgen::target;
@@ -62,36 +62,13 @@ fn each_entry_is_the_path_of_a_value_that_the_spec_has_once() {
         let found = errors(good);
         assert!(found.is_empty(), "{good}: {found:#?}");
     }
-    // Entry, code, part of message or help, and the offered replacement.
-    for (bad, code, words, replacement) in [
-        ("\"sensor.nois\"", "E0345", "did you mean \"sensor.noise\"?", "\"sensor.noise\""),
-        ("\"axial_stiffness\"", "E0345", "did you mean \"actuator.axial_stiffness\"?", "\"actuator.axial_stiffness\""),
-        ("\"k_a\"", "E0345", "did you mean \"actuator.axial_stiffness\"?", "\"actuator.axial_stiffness\""),
-        ("\"leg.stiffness\"", "E0345", "did you mean \"actuator.axial_stiffness\"?", "\"actuator.axial_stiffness\""),
-        ("\"sensor\"", "E0345", "name its assumed keys one by one, such as \"sensor.range\", \"sensor.noise\"", ""),
-        ("\"name\"", "E0345", "names no value of a spec", ""),
-        ("\"assumed\"", "E0345", "names no value of a spec", ""),
-        ("\"everything\"", "E0345", "as in assumed = [\"sensor.noise\"]", ""),
-        ("\"sensor.noise \"", "E0345", "did you mean \"sensor.noise\"?", "\"sensor.noise\""),
-        ("\"gauge[x].point\"", "E0345", "did you mean \"gauge.point\"?", "\"gauge.point\""),
-        ("\"gauge[6].point\"", "E0345", "this spec has no value `gauge[6].point`", ""),
-        ("\"gauge[6]\"", "E0345", "this spec has no value `gauge[6]`", ""),
-        ("\"workspace.rotation[3]\"", "E0345", "this spec has no value `workspace.rotation[3]`", ""),
-        ("\"requirements.precision\"", "E0345", "this spec has no value", ""),
-        ("\"trigger\"", "E0345", "this spec has no value", ""),
-        ("\"gains.integral\"", "E0345", "this spec has no value", ""),
-        ("\"sensor.noise\", \"sensor.noise\"", "E0346", "named twice", ""),
-        ("\"gauge\", \"gauge[2].point\"", "E0346", "name the same value", ""),
-        ("\"gauge[2].point\", \"gauge.point\"", "E0346", "name the same value", ""),
-        ("\"sensor.range[1]\", \"sensor.range\"", "E0346", "name the same value", ""),
-        ("3", "E0206", "expected the path of a key in quotes", ""),
-    ] {
-        let found = errors(bad);
-        let [[id, said, key, fix]] = &found[..] else { panic!("{bad}: {found:#?}") };
-        assert!(id == code && said.contains(words) && key.starts_with("assumed["), "{bad}: {found:#?}");
-        assert_eq!(fix, replacement, "{bad}");
+    cases::hold(&repository().join("tests/cases/assumed.txt"), 1, |case| {
+        let (bad, found) = (&case.title, errors(&case.title));
+        let [[code, said, key, fix]] = &found[..] else { panic!("{bad}: {found:#?}") };
+        assert!(key.starts_with("assumed["), "{bad}: {found:#?}");
         assert!(fix.is_empty() || errors(fix).is_empty(), "{bad}: the fix is accepted");
-    }
+        format!("{code} {key}: {said}\n{fix}")
+    });
     // Only at the entry; a wrong value has its own finding and no second one.
     let legs = |list: &str| with_list(&folder, "legs.toml", list);
     let noise = "assumed = [\"sensor.noise\"]\n";

@@ -6,7 +6,7 @@ use std::fs;
 use std::os::unix::ffi::OsStringExt;
 use std::os::unix::fs::{PermissionsExt, symlink};
 
-use crate::support::{Document, Folder, Run};
+use crate::support::{Document, Folder, Run, cases, repository};
 
 const COMMANDS: [&str; 21] = [
     "check",
@@ -36,96 +36,15 @@ const COMMANDS: [&str; 21] = [
 fn arguments_that_make_no_sense_are_usage_errors() {
     let folder = Folder::new();
     let before = folder.listing();
-    let record = "records/leg1.csv";
-    let cases: &[(&[&str], &str)] = &[
-        (&[], "<SPEC>"),
-        (&["--bogus"], "--bogus"),
-        (&["legs.toml", "--bogus"], "--bogus"),
-        (&["legs.toml", "-o"], "--output"),
-        (&["legs.toml", "-o", ""], "--output"),
-        (&["legs.toml", "minimal.toml"], "expected one spec file"),
-        (&["legs.toml", "--no-build", "--setup"], "--setup"),
-        (&["chek", "legs.toml"], "did you mean `specgen check`?"),
-        (&["chek"], "did you mean `specgen check`?"),
-        (
-            &["frobnicate", "legs.toml"],
-            "new, check, explain, build, size, flash, sim, tune, design, learn, robust, report, reproduce, pil, operate, panel, gcs, replay, dynamics, export, identify, forc, plant, doctor, lsp, dump-ir, cache, completions",
-        ),
-        (&["check"], "<SPEC>"),
-        (&["explain", "w0441"], "did you mean E0441, workspace bound that no pose reaches?"),
-        (&["explain", "X9999"], "docs/diagnostics.md lists them"),
-        (&["dump-ir"], "<SPEC>"),
-        (&["sim"], "<SPEC>"),
-        (&["sim", "legs.toml", "--samples", "0"], "--samples"),
-        (&["sim", "legs.toml", "--seed", "-1"], "--seed"),
-        (&["sim", "legs.toml", "--latency", "-1"], "--latency"),
-        (&["sim", "legs.toml", "--frequency", "0"], "expected a frequency from 0.001 to 1000 Hz, found `0`"),
-        (&["sim", "legs.toml", "--trajectory", "case-1"], "this spec has no [control]"),
-        (&["sim", "legs.toml", "--traces"], "--output"),
-        (&["sim", "reference.toml", "--trajectory", "cas-1"], "did you mean `case-1`?"),
-        (&["sim", "reference.toml", "--samples", "100"], "runs at its timing.period"),
-        (
-            &["sim", "reference.toml", "--trajectory", "case-3"],
-            "the spec has no trajectory `case-3`, only case-1, case-2, machining",
-        ),
-        (
-            &["sim", "reference.toml", "--trajectory", "case-1", "--frequency", "2"],
-            "--frequency applies to waves and the paper's cases",
-        ),
-        (&["tune"], "<SPEC>"),
-        (&["tune", "legs.toml", "--bounds", "level"], "expected GROUP=LOW:HIGH such as ki=10:1000, found `level`"),
-        (&["tune", "legs.toml", "--gain-margin", "0.5"], "expected a factor from 1 to 20, found `0.5`"),
-        (&["tune", "legs.toml", "--seconds", "nan"], "expected a time from 0.01 to 1000 s, found `nan`"),
-        (&["tune", "legs.toml", "--trajectory", "case-1"], "--trajectory leg needs six legs"),
-        (&["tune", "legs.toml", "--latency", "1"], "--latency needs a spec with [control]"),
-        (&["pil"], "<SPEC>"),
-        (&["pil", "legs.toml", "--scenario", "case-1"], "the leg trajectory is the only scenario"),
-        (&["pil", "legs.toml", "--mode", "pf-pcc"], "expected one of invhys, ewma, pcc"),
-        (&["pil", "legs.toml", "--seconds", "0"], "expected a time from 0.001 to 1000 s, found `0`"),
-        (&["pil", "legs.toml", "--baud", "9600"], "--port"),
-        (&["pil", "reference.toml", "--scenario", "case-3"], "there is no scenario `case-3`"),
-        (&["pil", "reference.toml", "--samples", "100"], "runs at its timing.period"),
-        (&["pil", "reference.toml", "--trajectory", "case-3"], "has no trajectory `case-3`"),
-        (&["operate"], "--port"),
-        (&["gcs"], "--port"),
-        (&["gcs", "--socket", "y", "--axis", "1=Q"], "with an axis of X Y Z U V W"),
-        (&["gcs", "--socket", "y", "--listen", "here"], "invalid value"),
-        (&["operate", "--port", "x", "--socket", "y"], "cannot be used with"),
-        (&["operate", "--socket", "y", "--baud", "9600"], "cannot be used with"),
-        (&["operate", "--socket", "y", "legs.toml", "go"], "invalid command `go`; expected one of: status, arm"),
-        (&["operate", "--socket", "y", "shutdown", "arm"], "`shutdown` ends the session: it must be the last command"),
-        (&["operate", "--socket", "y", "stop"], "`stop`: `hold` stops the motion"),
-        (&["operate", "--socket", "y", "--script", "none.txt", "arm"], "not both"),
-        (&["forc"], "--output"),
-        (&["forc", "-o", "x.csv", "--grid", "1"], "--grid"),
-        (&["plant"], "<SPEC>"),
-        (&["plant", "legs.toml", "--name", "a/b"], "letters, digits, `-` and `_`, found `a/b`"),
-        (&["plant", "legs.toml", "--seconds", "0"], "expected a time from 0.01 to 10000000 s, found `0`"),
-        (&["plant", "legs.toml", "--priority", "99"], "--priority"),
-        (&["doctor", "--seconds", "nan"], "expected a time from 0.1 to 86400 s, found `nan`"),
-        (&["identify", record], "--drive"),
-        (&["identify", record, "--drive", "10"], "two voltages LOW:HIGH in V, found `10`"),
-        (&["identify", record, "--drive", "10:5"], "below the upper one"),
-        (&["identify", record, "--drive", "0:nan"], "expected voltages from -10000 to 10000 V, found `0:nan`"),
-        (&["identify", record, "--drive", "0:1e308"], "expected voltages from -10000 to 10000 V"),
-        (&["identify", record, "--drive", "a:b"], "two voltages"),
-        (&["identify", record, "--drive", "0:100", "--grid", "x"], "whole number, found `x`"),
-        (&["identify", record, "--drive", "0:100", "--grid", "-3"], "whole number, found `-3`"),
-        (&["identify", record, "--drive", "0:100", "--plot", "x.png"], "ends in .svg or .html, found `x.png`"),
-        (&["identify", "linear"], "<RECORDS>"),
-        (&["identify", "linear", record, "--frequency", "1,2"], "2 frequencies for 1 records"),
-        (&["identify", "linear", record, "--frequency", "0"], "frequency in Hz above zero, found `0`"),
-        (&["identify", "response"], "<RECORD>"),
-        (&["identify", "gauge", record, "--degree", "6"], "--degree"),
-        (&["identify", "stiffness", record, "--drive", "0:1"], "--drive"),
-    ];
-    for (number, (arguments, word)) in cases.iter().enumerate() {
-        folder.run(arguments).says(2, &["error: ", word]);
+    for (number, (case, _)) in cases::read(&repository().join("tests/cases/usage_errors.txt")).iter().enumerate() {
+        let (words, word) = (shlex::split(&case.title).unwrap(), case.one('w').unwrap());
+        let arguments: Vec<&str> = words.iter().skip(1).map(String::as_str).collect();
+        folder.run(&arguments).says(2, &["error: ", word]);
         // As JSON, one of four in the short run.
         if !number.is_multiple_of(support::length(4, 1)) {
             continue;
         }
-        let document = folder.json(arguments);
+        let document = folder.json(&arguments);
         assert_eq!(document.code, 2, "{arguments:?}");
         assert!(document.error().contains(word), "{arguments:?}: {}", document.error());
         // Earlier findings of the spec are kept: they are warnings.

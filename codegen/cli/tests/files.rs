@@ -60,8 +60,8 @@ const LINES: &[(&str, &[(&str, &str)])] = &[
 /// Commands without file arguments.
 const WITHOUT: [&str; 6] =
     ["specgen explain", "specgen export", "specgen lsp", "specgen cache", "specgen completions", "specgen help"];
-/// Path arguments without a path type: a folder relative to the spec, and words of which some are files.
-const UNTYPED: [&str; 2] = ["specgen identify gains output", "specgen operate words"];
+/// A path argument without a path type: words of which some are files.
+const UNTYPED: [&str; 1] = ["specgen operate words"];
 
 /// An argument that names a file.
 struct Slot {

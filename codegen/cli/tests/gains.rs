@@ -92,7 +92,7 @@ fn a_run_of_the_machine_gives_the_gain_of_each_leg_and_tables_that_take_its_erro
         .says(1, &["was recorded with spec digest", "give the spec that the target was built from"]);
     folder
         .run(&["identify", "gains", "run.rec", "--spec", "off.toml", "-o", "../elsewhere"])
-        .says(2, &["expected a folder relative to the spec's, such as `gains`"]);
+        .says(2, &["expected a folder within that of the spec, such as `gains`"]);
     folder
         .run(&["identify", "gains", "run.rec", "--spec", "legs.toml"])
         .says(1, &["six legs with their own gauges have one record each", "specgen identify linear"]);

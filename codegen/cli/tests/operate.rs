@@ -8,11 +8,10 @@ use std::path::PathBuf;
 use std::process::{Command, Stdio};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
-use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use crate::board_support::Line;
-use crate::support::{Folder, Run, length};
+use crate::support::{Background, Folder, Run, length};
 use controller::supervised::Phase;
 use specgen_link::client::Port;
 
@@ -23,8 +22,7 @@ struct SocketBoard {
     phase: Arc<AtomicU32>,
     /// Set to make the converters fail.
     fails: Arc<AtomicBool>,
-    over: Arc<AtomicBool>,
-    thread: Option<JoinHandle<()>>,
+    _serves: Background,
 }
 
 impl SocketBoard {
@@ -32,12 +30,10 @@ impl SocketBoard {
         let path = folder.path("board.sock");
         let listener = UnixListener::bind(&path).unwrap();
         listener.set_nonblocking(true).unwrap();
-        let (phase, fails, over) = (Arc::default(), Arc::default(), Arc::default());
-        let thread = {
-            let (phase, fails, over) = (Arc::clone(&phase), Arc::clone(&fails), Arc::clone(&over));
-            std::thread::spawn(move || serve(&listener, &phase, &fails, &over))
-        };
-        Self { path, phase, fails, over, thread: Some(thread) }
+        let (phase, fails) = (Arc::default(), Arc::default());
+        let shared = (Arc::clone(&phase), Arc::clone(&fails));
+        let serves = Background::new(move |over| serve(&listener, &shared.0, &shared.1, over));
+        Self { path, phase, fails, _serves: serves }
     }
 
     fn is(&self, phase: Phase) -> bool {
@@ -48,15 +44,6 @@ impl SocketBoard {
         let mut command = folder.command();
         command.args(["operate", "--socket"]).arg(&self.path).args(arguments);
         command
-    }
-}
-
-impl Drop for SocketBoard {
-    fn drop(&mut self) {
-        self.over.store(true, Ordering::Relaxed);
-        if let Some(thread) = self.thread.take() {
-            thread.join().unwrap();
-        }
     }
 }
 

@@ -30,7 +30,7 @@ fn scaled(table: &str, factor: f64) -> String {
 
 /// The records line of six tables, the third from `third`.
 fn records(third: &str) -> String {
-    let tables = (1..=6).map(|leg| if leg == 3 { format!("\"{third}\"") } else { format!("\"own/leg{leg}.csv\"") });
+    let tables = (0..6).map(|leg| if leg == 2 { format!("\"{third}\"") } else { format!("\"own/leg{leg}.csv\"") });
     format!("records = [{}]", tables.collect::<Vec<_>>().join(", "))
 }
 
@@ -68,30 +68,30 @@ fn a_leg_that_lost_gain_is_named_and_no_other() {
         let first = folder.run(&["identify", "run.rec", "--spec", "new.toml", "-o", "own"]);
         // A quarter of the stroke tells the gain, and not the cubic term.
         assert_eq!(first.code, 0, "{}", first.stderr);
-        for part in ["cubic term of leg 1, 2, 3, 4, 5, 6: not determined by this run, kept", "assumed unchanged; refit"]
+        for part in ["cubic term of leg 0, 1, 2, 3, 4, 5: not determined by this run, kept", "assumed unchanged; refit"]
         {
             assert!(first.stdout.contains(part), "{}", first.stdout);
         }
 
         // In the short run, the five other legs are the unchanged ones.
         if length(false, true) {
-            spec(&folder, "own.toml", &records("own/leg3.csv"));
+            spec(&folder, "own.toml", &records("own/leg2.csv"));
             let (legs, named) = refit(&folder, "own.toml", &plant);
             println!("{plant:?}: unchanged {:+.4?}", numbers(&legs, "gain"));
             assert!(named.is_empty(), "{named:?}");
             assert!(numbers(&legs, "gain").iter().all(|[change, error]| change.abs() < 0.01 && *error < 0.01));
         }
 
-        folder.write("leg3.csv", scaled(&folder.read("own/leg3.csv"), 1.0 / 0.979));
-        spec(&folder, "lost.toml", &records("leg3.csv"));
+        folder.write("leg2.csv", scaled(&folder.read("own/leg2.csv"), 1.0 / 0.979));
+        spec(&folder, "lost.toml", &records("leg2.csv"));
         let (legs, named) = refit(&folder, "lost.toml", &plant);
-        println!("  leg 3 with -2.1 % {:+.4?}", numbers(&legs, "gain"));
-        for (leg, [change, error]) in (1..).zip(numbers(&legs, "gain")) {
+        println!("  leg 2 with -2.1 % {:+.4?}", numbers(&legs, "gain"));
+        for (leg, [change, error]) in numbers(&legs, "gain").into_iter().enumerate() {
             let is_good =
-                if leg == 3 { (change + 0.021).abs() < 3.0 * error } else { change.abs() < 0.01 && error < 0.01 };
+                if leg == 2 { (change + 0.021).abs() < 3.0 * error } else { change.abs() < 0.01 && error < 0.01 };
             assert!(is_good, "leg {leg}: {change} ± {error}");
         }
-        assert!(named.len() == 1 && named[0].starts_with("leg 3: gain -2."), "{named:?}");
+        assert!(named.len() == 1 && named[0].starts_with("leg 2: gain -2."), "{named:?}");
         assert!(named[0].ends_with("% since identification, cubic term assumed unchanged; refit"), "{named:?}");
     }
 }
@@ -103,7 +103,7 @@ fn a_delay_of_the_machine_is_named_if_the_motion_is_fast_enough() {
     let fast = ["--frequency", "5"];
     folder.run(&["sim", "reference.toml", "--record", "run.rec", "--seconds", "2", fast[0], fast[1]]).says(0, &[]);
     folder.run(&["identify", "run.rec", "--spec", "reference.toml", "-o", "own"]).says(0, &[]);
-    spec(&folder, "own.toml", &records("own/leg3.csv"));
+    spec(&folder, "own.toml", &records("own/leg2.csv"));
     let (before, named) = refit(&folder, "own.toml", &fast);
     assert!(named.is_empty(), "{named:?}");
     let (after, named) = refit(&folder, "own.toml", &[&fast[..], &["--latency", "2"]].concat());
@@ -132,8 +132,8 @@ fn a_run_that_does_not_show_the_legs_is_refused_with_one_that_does() {
     beside.current_dir(folder.path("lab"));
     beside.args(["identify", "../run.rec", "--spec", "../reference.toml", "-o", "new"]);
     let run = crate::support::Run::of(&mut beside);
-    assert!(run.code == 0 && run.stdout.contains("records = [\"lab/new/leg1.csv\""), "{run:#?}");
-    assert!(folder.path("lab/new/leg6.csv").is_file());
+    assert!(run.code == 0 && run.stdout.contains("records = [\"lab/new/leg0.csv\""), "{run:#?}");
+    assert!(folder.path("lab/new/leg5.csv").is_file());
     beside = folder.command();
     beside.args(["identify", "run.rec", "--spec", "lab/other.toml", "-o", "new"]);
     std::fs::copy(folder.path("reference.toml"), folder.path("lab/other.toml")).unwrap();

@@ -136,15 +136,14 @@ pub fn findings(model: &Model, precision: &Precision, noise: Option<&PoseNoise>)
         return Vec::new();
     }
     let unit = if worst < 3 { "nm" } else { "nrad" };
+    let (axis, error) = (["x", "y", "z", "theta_x", "theta_y", "theta_z"][worst], total(worst) * 1e9);
+    let rms = noise.pose[worst] * 1e9;
     vec![Diagnostic::at(
         &model.spans,
         &["controller.scalar", "controller"],
         codes::PRECISION_POOR,
         format!(
-            "rounding may put {} off by {:.3} {unit}, more than the noise of the gauges of {:.3} {unit} rms",
-            ["x", "y", "z", "theta_x", "theta_y", "theta_z"][worst],
-            total(worst) * 1e9,
-            noise.pose[worst] * 1e9
+            "rounding may put {axis} off by {error:.3} {unit}, more than the noise of the gauges of {rms:.3} {unit} rms"
         ),
         "write scalar = \"f64\", or reduce [workspace]".to_owned(),
     )]

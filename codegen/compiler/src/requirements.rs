@@ -50,17 +50,14 @@ pub fn check(model: &Model) -> Result<(), Vec<Diagnostic>> {
     let [low, high] = model.dac.range;
     let range = (high - low) * precision / largest;
     let nanometres = |metres: f64| format!("{:.3} nm", metres * 1e9);
+    let (step, limit, converter, volts) = (nanometres(largest), nanometres(precision), model.dac.bits, high - low);
+    let leg = nanometres(steps.leg);
     Err(vec![Diagnostic::at(
         &model.spans,
         &["requirements.precision"],
         codes::TOO_FEW_BITS,
         format!(
-            "{what} by {}, more than the {} of requirements.precision (dac.bits = {} over {} V, {} per code at a leg)",
-            nanometres(largest),
-            nanometres(precision),
-            model.dac.bits,
-            high - low,
-            nanometres(steps.leg)
+            "{what} by {step}, more than the {limit} of requirements.precision (dac.bits = {converter} over {volts} V, {leg} per code at a leg)"
         ),
         match enough {
             Some(bits) => {

@@ -87,15 +87,11 @@ fn finding(model: &Model, noise: &RestNoise, axis: usize) -> Option<Diagnostic> 
     let unit = if axis < 3 { "nm" } else { "nrad" };
     let shown = |value: f64| format!("{:.3} {unit}", value * 1e9);
     let (gauges, amplifiers) = (noise.gauges[axis], noise.amplifiers[axis]);
+    let (rms, name, most, of_gauges) = (shown(noise.pose[axis]), AXES[axis], shown(limit), shown(gauges));
+    let (reading, of_amplifiers) = (noise.reading * 1e9, shown(amplifiers));
     let message = format!(
-        "the pose at rest has a noise of {} rms in {}, more than the {} of {key}: {} from the gauges ({:.3} nm per reading, with the steps of \
-         their converter), {} from the amplifiers",
-        shown(noise.pose[axis]),
-        AXES[axis],
-        shown(limit),
-        shown(gauges),
-        noise.reading * 1e9,
-        shown(amplifiers)
+        "the pose at rest has a noise of {rms} rms in {name}, more than the {most} of {key}: {of_gauges} from the gauges ({reading:.3} nm per reading, with the steps of \
+         their converter), {of_amplifiers} from the amplifiers"
     );
     let (what, source) = if gauges > amplifiers {
         ("the gauges", "`sensor.noise`, `sensor.bits`")

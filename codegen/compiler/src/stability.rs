@@ -123,16 +123,12 @@ fn check_law(
     }
     let radius = worst_radius(dynamics, adaptation, law, 1.0);
     if radius > LARGEST_RADIUS {
+        let (name, run, lag, resonance) = (law.name(), dynamics.run, dynamics.lag, model.actuator.resonance);
+        let (damping, gauge_lag) = (dynamics.damping_ratio, gauge_lag_text(dynamics.gauge_lag));
+        let range = adaptation.gain_ratio;
         let message = format!(
-            "{} is unstable on this leg: the sampled loop (run of {} s, amplifier lag {} s, resonance {} Hz, ζ {}{}) has \
-             spectral radius {radius:.4} somewhere in gain_ratio {:?}; it must be below 1",
-            law.name(),
-            dynamics.run,
-            dynamics.lag,
-            model.actuator.resonance,
-            dynamics.damping_ratio,
-            gauge_lag_text(dynamics.gauge_lag),
-            adaptation.gain_ratio
+            "{name} is unstable on this leg: the sampled loop (run of {run} s, amplifier lag {lag} s, resonance {resonance} Hz, ζ {damping}{gauge_lag}) has \
+             spectral radius {radius:.4} somewhere in gain_ratio {range:?}; it must be below 1"
         );
         return Err(vec![refusal(model, codes::UNSTABLE_SAMPLED, law, message, largest)]);
     }

@@ -117,12 +117,9 @@ fn check_displacement_unit(record: &Record, findings: &mut Findings) {
     }
     let at = |value: f64| record.displacement.iter().position(|y| *y == value).map_or(0.0, |k| record.time[k]);
     let unit = if range > PLAUSIBLE_RANGE[1] { "nm" } else { "mm or m" };
+    let (lowest, at_lowest, highest, at_highest) = (micrometres(low), at(low), micrometres(high), at(high));
     let message = format!(
-        "the displacement goes from {} um (at {} s) to {} um (at {} s), which no piezo actuator does: is it in {unit}?",
-        micrometres(low),
-        at(low),
-        micrometres(high),
-        at(high)
+        "the displacement goes from {lowest} um (at {at_lowest} s) to {highest} um (at {at_highest} s), which no piezo actuator does: is it in {unit}?"
     );
     findings.add(codes::DISPLACEMENT_UNIT, None, message, "convert the column to micrometres");
 }
@@ -226,12 +223,10 @@ pub(crate) fn check_excited(plane: &Plane, excited: &[bool], findings: &mut Find
     if regions.len() > NAMED {
         places.push(format!("{} smaller parts", regions.len() - NAMED));
     }
+    let (all, percent, parts) = (excited.len(), 100.0 * missing as f64 / excited.len() as f64, places.join("; "));
     let message = format!(
-        "{missing} of {} cells of the plane ({:.1} %) were never excited apart from their neighbours ({}): there the record holds only sums of weights. \
-         No weight is added to these sums; within a part the table divides them evenly, a straight line between the measured curves around it",
-        excited.len(),
-        100.0 * missing as f64 / excited.len() as f64,
-        places.join("; "),
+        "{missing} of {all} cells of the plane ({percent:.1} %) were never excited apart from their neighbours ({parts}): there the record holds only sums of weights. \
+         No weight is added to these sums; within a part the table divides them evenly, a straight line between the measured curves around it"
     );
     let help = "add reversal curves that turn back in that part of the range";
     findings.add(codes::CELLS_INTERPOLATED, None, message, help);

@@ -228,16 +228,14 @@ fn of_right_scale(model: &Model, name: &str, table: &EverettTable) -> Result<(),
     if (expected / LARGEST_SCALE..=expected * LARGEST_SCALE).contains(&found) {
         return Ok(());
     }
+    let (moved, stacks, stack_gain) = (found * 1e6, model.actuator.stacks, model.actuator.stack_gain);
+    let given = expected * 1e6;
     Err(vec![about_file(
         name,
         codes::RECORD_SCALE,
         "hysteresis.records",
         format!(
-            "the record moves by {:.4} µm over {min} V to {max} V; {} stacks of {} m/V give {:.4} µm",
-            found * 1e6,
-            model.actuator.stacks,
-            model.actuator.stack_gain,
-            expected * 1e6
+            "the record moves by {moved:.4} µm over {min} V to {max} V; {stacks} stacks of {stack_gain} m/V give {given:.4} µm"
         ),
         "check that the displacement is in µm, or fix actuator.stacks and actuator.stack_gain".to_owned(),
     )])
@@ -323,19 +321,17 @@ fn not_invertible(model: &Model, share: f64, needed: f64) -> Diagnostic {
     // To two digits, upwards.
     let digit = libm::pow(10.0, libm::floor(libm::log10(needed * 1e3)) - 1.0);
     let milliseconds = libm::ceil(needed * 1e3 / digit) * digit;
+    let (longer, enough) = (micro(milliseconds), 100.0 * INVERTED);
+    let (milliseconds, percent) = (micro(model.timing.period * 1e3), 100.0 * share);
     Diagnostic::at(
         &model.spans,
         &["hysteresis.rate"],
         codes::RATE_NOT_INVERTIBLE,
         format!(
-            "at a period of {} ms the dynamic Preisach model (6) can be inverted on only {:.0} % of the travel; elsewhere ticks use the static inverse",
-            micro(model.timing.period * 1e3),
-            100.0 * share
+            "at a period of {milliseconds} ms the dynamic Preisach model (6) can be inverted on only {percent:.0} % of the travel; elsewhere ticks use the static inverse"
         ),
         format!(
-            "with timing.period = \"{} ms\" it can be on {:.0} %; or write rate = \"creep\" or \"static\"; or identify the tables again with a dead time, which a controller leads by at any period",
-            micro(milliseconds),
-            100.0 * INVERTED
+            "with timing.period = \"{longer} ms\" it can be on {enough:.0} %; or write rate = \"creep\" or \"static\"; or identify the tables again with a dead time, which a controller leads by at any period"
         ),
     )
 }

@@ -205,12 +205,10 @@ fn spikes(record: &mut Record, residual: &mut Residual, half: usize, least: f64,
             record.weightless[first + k] = true;
             residual.rest[k] -= error;
         }
+        let (start, stop, most) = (record.time[first + from], record.time[first + end - 1], most * 1e6);
+        let samples = end - from;
         let message = format!(
-            "from {} s to {} s the displacement is off the model by up to {:.3} um: these {} samples get no weight",
-            record.time[first + from],
-            record.time[first + end - 1],
-            most * 1e6,
-            end - from
+            "from {start} s to {stop} s the displacement is off the model by up to {most:.3} um: these {samples} samples get no weight"
         );
         let help = "look for interference or a loose contact, or record again";
         findings.add(codes::RECORD_GLITCH, None, message, help);
@@ -250,10 +248,9 @@ fn steps(record: &mut Record, residual: &mut Residual, half: usize, least: f64, 
     }
     residual.drop_gathered(&mut found, |(at, _)| (*at, *at), half);
     for (at, step) in &found {
+        let (at_time, height) = (record.time[first + at], step * 1e6);
         let message = format!(
-            "at {} s the displacement steps by {:.3} um without the drive, as where two runs are joined: the step is subtracted from there on",
-            record.time[first + at],
-            step * 1e6
+            "at {at_time} s the displacement steps by {height:.3} um without the drive, as where two runs are joined: the step is subtracted from there on"
         );
         let help = "identify each run alone, or find what moved: a loose mount, another gauge range, a lost count";
         findings.add(codes::RECORD_STEP, None, message, help);

@@ -73,10 +73,9 @@ fn glitches(
         }
         weightless[k] = true;
         displacement[k] = 0.5 * (displacement[k - 1] + displacement[k + 1]);
+        let (at_time, distance) = (time[k], off * 1e6);
         let message = format!(
-            "at {} s the displacement is off its neighbours by {:.3} um for a single sample: it gets no weight",
-            time[k],
-            off * 1e6
+            "at {at_time} s the displacement is off its neighbours by {distance:.3} um for a single sample: it gets no weight"
         );
         let help = "look for interference or a loose contact, or record again";
         findings.add(codes::RECORD_GLITCH, Some(lines.at(k)), message, help);
@@ -103,13 +102,10 @@ fn jumps(
             continue;
         }
         reported = end;
+        let (time, before, after, samples) = (time[k], drive[k - 1], drive[k], end - k);
+        let settling = 1e3 * settling_time.unwrap_or_default();
         let message = format!(
-            "at {} s the drive jumps from {} V to {} V: {} samples from there ({:.1} ms) get no weight",
-            time[k],
-            drive[k - 1],
-            drive[k],
-            end - k,
-            1e3 * settling_time.unwrap_or_default()
+            "at {time} s the drive jumps from {before} V to {after} V: {samples} samples from there ({settling:.1} ms) get no weight"
         );
         let help = "drive by ramps or sines: a jump excites the resonance, which hides the hysteresis";
         findings.add(codes::RECORD_JUMP, Some(lines.at(k)), message, help);

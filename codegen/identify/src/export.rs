@@ -113,11 +113,9 @@ fn check_weights(table: &EverettTable, lines: &LineNumbers, findings: &mut Findi
         for down in 0..up {
             let weight = table.weight(up, down);
             if weight < -rounding {
+                let (below, above, excess) = (table.threshold(up), table.threshold(down), weight * 1e6);
                 let message = format!(
-                    "the weight of the cell below {} V and above {} V is negative ({:.3e} µm): the model would not be monotone",
-                    table.threshold(up),
-                    table.threshold(down),
-                    weight * 1e6
+                    "the weight of the cell below {below} V and above {above} V is negative ({excess:.3e} µm): the model would not be monotone"
                 );
                 let help = "identify the record again";
                 findings.add(codes::TABLE_FILE, Some(lines.at(EverettTable::index(up, down))), message, help);

@@ -122,10 +122,9 @@ fn calibrate_checked(signals: &Signals, degree: Option<usize>, findings: &mut Fi
     }
     if least.0 <= 0.0 {
         let near = nearest(volts, least.1);
+        let (volts, place) = (&least.1, signals.place(near));
         let message = format!(
-            "the calibration turns back at {:.4} V (near {}): there one voltage means two displacements",
-            least.1,
-            signals.place(near)
+            "the calibration turns back at {volts:.4} V (near {place}): there one voltage means two displacements"
         );
         let help = "use the gauge only where its voltage is monotonic, or look for a fault there";
         findings.add(codes::GAUGE_NOT_MONOTONE, Some(signals.lines.at(near)), message, help);
@@ -353,12 +352,8 @@ fn noise_of(residual: &[f64]) -> f64 {
 fn glitches(signals: &Signals, residual: &[f64], findings: &mut Findings) {
     let usual = noise_of(residual);
     for (k, r) in residual.iter().enumerate().filter(|(_, r)| r.abs() > 12.0 * usual && r.abs() > 0.0) {
-        let message = format!(
-            "at {} the residual is {:.2} nm, {:.0} times the usual one",
-            signals.place(k),
-            r * 1e9,
-            (r / usual).abs()
-        );
+        let (place, residual, times) = (signals.place(k), r * 1e9, (r / usual).abs());
+        let message = format!("at {place} the residual is {residual:.2} nm, {times:.0} times the usual one");
         let help = "delete the point if the reading was disturbed, or record again";
         findings.add(codes::GAUGE_GLITCH, Some(signals.lines.at(k)), message, help);
     }

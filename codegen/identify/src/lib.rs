@@ -92,7 +92,7 @@ pub use residual::Trace;
 pub use signals::Input;
 pub use specgen_language::model::MAX_GRID;
 pub use staircase::Staircase;
-pub use statistics::extent;
+pub use statistics::{extent, mean};
 
 /// What to identify.
 #[derive(Debug, Clone, Copy, PartialEq)]

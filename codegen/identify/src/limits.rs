@@ -69,13 +69,10 @@ pub(crate) fn check(lines: &LineNumbers, time: &[f64], drive: &[f64], displaceme
             let (y_low, y_high) = extent(&displacement[from..=to]);
             let near = 0.05 * (top - bottom);
             let where_ = if y_high > top - near || y_low < bottom + near { "is limited at" } else { "is stuck at" };
+            let (start, end, level, first) = (time[from], time[to], 0.5e6 * (y_low + y_high), drive[from]);
+            let last = drive[to];
             let message = format!(
-                "from {} s to {} s the displacement {where_} about {:.4} um while the drive goes from {} V to {} V",
-                time[from],
-                time[to],
-                0.5e6 * (y_low + y_high),
-                drive[from],
-                drive[to]
+                "from {start} s to {end} s the displacement {where_} about {level:.4} um while the drive goes from {first} V to {last} V"
             );
             let help =
                 "check the range of the gauge, the limit of the amplifier and the preload; record again within them";

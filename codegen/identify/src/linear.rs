@@ -84,11 +84,9 @@ fn relation_checked(record: &Record, frequency: Option<f64>, findings: &mut Find
     if starts.len() < 2 {
         // A record from one trough to the next has a cycle, but no two upward crossings: its frequency must be given.
         let Some(frequency) = frequency.filter(|f| duration * f >= 0.99) else {
+            let (start, end, crossed) = (record.time[0], record.time[record.time.len() - 1], starts.len());
             let message = format!(
-                "from {} s to {} s the drive crosses its middle upward {} times: there is no whole cycle to find the frequency from",
-                record.time[0],
-                record.time[record.time.len() - 1],
-                starts.len()
+                "from {start} s to {end} s the drive crosses its middle upward {crossed} times: there is no whole cycle to find the frequency from"
             );
             let help = "record two cycles or more, or give --frequency for a record of exactly one cycle";
             return findings.refuse(codes::NO_CYCLE, None, message, help);
@@ -99,11 +97,9 @@ fn relation_checked(record: &Record, frequency: Option<f64>, findings: &mut Find
     let mut periods: Vec<f64> = crossings.windows(2).map(|w| w[1] - w[0]).collect();
     let typical = median(&mut periods);
     if let Some(k) = crossings.windows(2).position(|w| ((w[1] - w[0]) / typical - 1.0).abs() > STEADY) {
+        let (start, end, lasted) = (crossings[k], crossings[k + 1], crossings[k + 1] - crossings[k]);
         let message = format!(
-            "the cycle from {} s to {} s lasts {:.4e} s, the others {typical:.4e} s: the record has no one frequency",
-            crossings[k],
-            crossings[k + 1],
-            crossings[k + 1] - crossings[k]
+            "the cycle from {start} s to {end} s lasts {lasted:.4e} s, the others {typical:.4e} s: the record has no one frequency"
         );
         let help = "record each frequency by itself: sines or triangles of one amplitude";
         return findings.refuse(codes::FREQUENCY_UNCLEAR, None, message, help);

@@ -94,20 +94,13 @@ impl Report {
     #[must_use]
     pub fn summary(&self) -> String {
         let simulated = if self.simulated { "simulated: " } else { "" };
+        let (curves, fit, percent) = (self.reversal_curves, self.fit_rms * 1e9, self.fit_rms_percent);
+        let (range, branches, noise) = (self.displacement_range * 1e6, self.branch_rms * 1e9, self.noise_floor * 1e9);
+        let (drift, dead_time, zero) = (self.drift * 1e9, self.dead_time * 1e3, self.zero_weights);
+        let (weights, excited) = (self.weights, self.excited_share * 100.0);
         format!(
-            "{simulated}{} reversal curves, fit {:.2} nm rms ({:.3} % of {:.2} µm; {:.2} nm within branches), noise {:.2} nm, drift {:.3} nm/s, dead time {:.3} ms, \
-         {} of {} weights zero, {:.1} % of the plane excited",
-            self.reversal_curves,
-            self.fit_rms * 1e9,
-            self.fit_rms_percent,
-            self.displacement_range * 1e6,
-            self.branch_rms * 1e9,
-            self.noise_floor * 1e9,
-            self.drift * 1e9,
-            self.dead_time * 1e3,
-            self.zero_weights,
-            self.weights,
-            self.excited_share * 100.0
+            "{simulated}{curves} reversal curves, fit {fit:.2} nm rms ({percent:.3} % of {range:.2} µm; {branches:.2} nm within branches), noise {noise:.2} nm, drift {drift:.3} nm/s, dead time {dead_time:.3} ms, \
+         {zero} of {weights} weights zero, {excited:.1} % of the plane excited"
         )
     }
 }

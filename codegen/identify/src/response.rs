@@ -107,10 +107,9 @@ fn respond_checked(signals: &Signals, segment: Option<usize>, findings: &mut Fin
     let segment = segment.unwrap_or_else(|| automatic(n));
     let averages = if segment < 32 || segment > n { 0 } else { (2 * (n - segment)) / segment + 1 };
     if averages < AVERAGES {
+        let (from, to) = (signals.place(0), signals.place(n - 1));
         let message = format!(
-            "{n} samples from {} to {} give {averages} segments of {segment}; at least {AVERAGES} are needed for a coherence",
-            signals.place(0),
-            signals.place(n - 1)
+            "{n} samples from {from} to {to} give {averages} segments of {segment}; at least {AVERAGES} are needed for a coherence"
         );
         let help = "record longer, or choose a shorter --segment (32 or more)";
         return findings.refuse(codes::RESPONSE_SAMPLES, None, message, help);
@@ -194,10 +193,9 @@ fn sampling_rate(signals: &Signals, findings: &mut Findings) -> Option<f64> {
     let off = |k: usize| (time[k] - time[0] - k as f64 * even).abs();
     let worst = (0..time.len()).fold(0, |w, k| if off(k) > off(w) { k } else { w });
     if off(worst) > 0.5 * even || (even / interval - 1.0).abs() > UNIFORM {
+        let (at_time, intervals) = (time[worst], off(worst) / even);
         let message = format!(
-            "the samples are not evenly spaced: at {} s the time is {:.2} sampling intervals off",
-            time[worst],
-            off(worst) / even
+            "the samples are not evenly spaced: at {at_time} s the time is {intervals:.2} sampling intervals off"
         );
         let help = "record with a fixed sampling interval, without lost samples";
         return findings.refuse(codes::RESPONSE_SAMPLES, Some(signals.lines.at(worst)), message, help);
@@ -232,11 +230,9 @@ fn check_limits(signals: &Signals, findings: &mut Findings) {
     let values = signals.column(2);
     for Standstill { first, run, input: [a, b] } in standstills(signals.column(1), values, (values.len() / 50).max(20))
     {
+        let (start, end, stuck) = (signals.place(first), signals.place(first + run - 1), values[first]);
         let message = format!(
-            "from {} to {} the displacement is stuck at {} um for {run} samples while the drive goes through {a} V to {b} V",
-            signals.place(first),
-            signals.place(first + run - 1),
-            values[first]
+            "from {start} to {end} the displacement is stuck at {stuck} um for {run} samples while the drive goes through {a} V to {b} V"
         );
         let help = "check the connection of the gauge and record again";
         findings.add(codes::RECORD_STUCK, Some(signals.lines.at(first)), message, help);

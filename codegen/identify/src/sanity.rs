@@ -70,12 +70,8 @@ pub(crate) fn check_time(lines: &LineNumbers, time: &[f64], findings: &mut Findi
     }
     let gap = GAP * median(&mut intervals);
     for (k, w) in time.windows(2).enumerate().filter(|(_, w)| w[1] - w[0] > gap) {
-        let message = format!(
-            "nothing was recorded between {} s and {} s ({:.0} sampling intervals)",
-            w[0],
-            w[1],
-            GAP * (w[1] - w[0]) / gap
-        );
+        let (start, end, missing) = (w[0], w[1], GAP * (w[1] - w[0]) / gap);
+        let message = format!("nothing was recorded between {start} s and {end} s ({missing:.0} sampling intervals)");
         let help = "record without gaps: a reversal of the drive may be missing";
         findings.add(codes::RECORD_GAP, Some(lines.at(k + 1)), message, help);
     }
@@ -143,14 +139,10 @@ fn check_sign(time: &[f64], drive: &[f64], displacement: &[f64], findings: &mut 
     let at = |value: f64| drive.iter().position(|u| *u == value).unwrap_or(0);
     let (low, high) = extent(drive);
     let (a, b) = (at(low).min(at(high)), at(low).max(at(high)));
+    let (start, end, drive_before, drive_after) = (time[a], time[b], drive[a], drive[b]);
+    let (before, after) = (displacement[a] * 1e6, displacement[b] * 1e6);
     let shown = format!(
-        "between {} s and {} s the drive goes from {} V to {} V and the displacement from {:.4} um to {:.4} um",
-        time[a],
-        time[b],
-        drive[a],
-        drive[b],
-        displacement[a] * 1e6,
-        displacement[b] * 1e6
+        "between {start} s and {end} s the drive goes from {drive_before} V to {drive_after} V and the displacement from {before:.4} um to {after:.4} um"
     );
     if correlation < -0.5 && !butterfly {
         let message = format!("the displacement falls when the drive rises (correlation {correlation:.2}): {shown}");

@@ -171,13 +171,10 @@ impl Signals {
         let (bottom, top) = statistics::extent(y);
         for Standstill { first, run, input: [a, b] } in standstills(self.column(input), y, 3) {
             let what = if y[first] == bottom || y[first] == top { "is limited at" } else { "is stuck at" };
+            let (start, end, name, value) = (self.place(first), self.place(first + run - 1), names[1], y[first]);
+            let other = names[0];
             let message = format!(
-                "from {} to {} `{}` {what} {} for {run} samples while `{}` goes through {a} to {b}",
-                self.place(first),
-                self.place(first + run - 1),
-                names[1],
-                y[first],
-                names[0]
+                "from {start} to {end} `{name}` {what} {value} for {run} samples while `{other}` goes through {a} to {b}"
             );
             let help = "check the range and the connection of that channel; record again within its range";
             findings.add(codes::RECORD_STUCK, Some(self.lines.at(first)), message, help);

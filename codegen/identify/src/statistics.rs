@@ -32,7 +32,7 @@ pub(crate) fn noise_floor(y: &[f64]) -> f64 {
 }
 
 /// Arithmetic mean; 0 for an empty slice.
-pub(crate) fn mean(values: &[f64]) -> f64 {
+pub fn mean(values: &[f64]) -> f64 {
     values.iter().fold(0.0, |sum, v| sum + v) / values.len().max(1) as f64
 }
 

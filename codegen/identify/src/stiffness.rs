@@ -80,11 +80,8 @@ pub fn measure(input: Input, shown_as: &str) -> Result<Estimate<AxialStiffness>,
 fn measure_checked(signals: &Signals, findings: &mut Findings) -> Option<AxialStiffness> {
     let (time, force) = (signals.column(0), signals.column(1));
     if time.len() < 30 {
-        let message = format!(
-            "has {} samples and ends at {} s; at least 30 are needed",
-            time.len(),
-            signals.place(time.len() - 1)
-        );
+        let (count, end) = (time.len(), signals.place(time.len() - 1));
+        let message = format!("has {count} samples and ends at {end} s; at least 30 are needed");
         return findings.refuse(
             codes::RECORD_TOO_SHORT,
             None,
@@ -104,10 +101,9 @@ fn measure_checked(signals: &Signals, findings: &mut Findings) -> Option<AxialSt
     let ramp: Vec<f64> = time.iter().map(|t| (t - middle) / duration).collect();
     let plain = fit(&[&one, force], &y)?;
     let Some(straight) = fit(&[&one, &ramp, force], &y) else {
+        let (from, to) = (signals.place(0), signals.place(time.len() - 1));
         let message = format!(
-            "from {} to {} the force only drifts in one direction: its effect cannot be distinguished from creep",
-            signals.place(0),
-            signals.place(time.len() - 1)
+            "from {from} to {to} the force only drifts in one direction: its effect cannot be distinguished from creep"
         );
         return findings.refuse(codes::STIFFNESS_RECORD, None, message, "raise and lower the force at least once");
     };
@@ -217,11 +213,9 @@ fn check_sign(signals: &Signals, force: &[f64], compliance: f64, error: f64, fin
         return findings.refuse(codes::STIFFNESS_RECORD, None, message, "use more force, or a gauge of less noise");
     }
     if compliance < 0.0 {
+        let (lowest, highest, stiffness) = (at(low), at(high), 1.0 / compliance);
         let message = format!(
-            "the displacement falls when the force rises (force lowest at {}, highest at {}): the stiffness would be {:.3e} N/m",
-            at(low),
-            at(high),
-            1.0 / compliance
+            "the displacement falls when the force rises (force lowest at {lowest}, highest at {highest}): the stiffness would be {stiffness:.3e} N/m"
         );
         let help = "count force positive where it pushes the displacement up: change the sign of one column";
         return findings.refuse(codes::STIFFNESS_SIGN, None, message, help);

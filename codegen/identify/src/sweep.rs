@@ -37,21 +37,17 @@ pub(crate) fn check(plane: &Plane, record: &Record, used: &RecordSpan, report: &
     let lag = if interval < LONGEST_LAG { interval } else { LONGEST_LAG };
     let unknown = !report.dead_time_basis.starts_with("estimated") && report.dead_time == 0.0;
     if rate * interval > plane.interval() {
+        let (time, per_sample, allowed) = (record.time[at], rate * interval, plane.interval());
         let message = format!(
-            "from {} s on the drive crosses more than one grid interval per sample ({:.3} V against {:.3} V): the sweep is too fast for the sampling",
-            record.time[at],
-            rate * interval,
-            plane.interval()
+            "from {time} s on the drive crosses more than one grid interval per sample ({per_sample:.3} V against {allowed:.3} V): the sweep is too fast for the sampling"
         );
         let help = "sweep more slowly, sample faster, or choose a coarser grid";
         findings.add(codes::SWEEP_TOO_FAST, None, message, help);
     } else if unknown && rate * lag > WIDENING * span {
+        let (time, delay, wider) = (record.time[at], lag * 1e3, 2.0 * rate * lag * gain * 1e9);
+        let basis = &report.dead_time_basis;
         let message = format!(
-            "from {} s on the drive runs at {rate:.0} V/s, where a dead time of {:.3} ms alone widens the loop by {:.1} nm; any dead time then counts as hysteresis (dead time {})",
-            record.time[at],
-            lag * 1e3,
-            2.0 * rate * lag * gain * 1e9,
-            report.dead_time_basis
+            "from {time} s on the drive runs at {rate:.0} V/s, where a dead time of {delay:.3} ms alone widens the loop by {wider:.1} nm; any dead time then counts as hysteresis (dead time {basis})"
         );
         let help =
             "sweep more slowly, or record branches of at least two rates so that the dead time can be identified";
@@ -62,10 +58,9 @@ pub(crate) fn check(plane: &Plane, record: &Record, used: &RecordSpan, report: &
     let mut spacing: Vec<f64> = turns.windows(2).map(|w| w[1] - w[0]).filter(|d| *d > SAME_LEVEL * span).collect();
     let between = median(&mut spacing);
     if between > 0.0 && between * gain < ABOVE_NOISE * report.noise_floor {
+        let (way, noise) = (between * gain * 1e9, report.noise_floor * 1e9);
         let message = format!(
-            "neighbouring curves turn back {between:.3} V apart, {:.2} nm of displacement, while the noise is {:.2} nm rms: what lies between them is noise",
-            between * gain * 1e9,
-            report.noise_floor * 1e9
+            "neighbouring curves turn back {between:.3} V apart, {way:.2} nm of displacement, while the noise is {noise:.2} nm rms: what lies between them is noise"
         );
         let help = "record fewer curves with more samples each, or average several sweeps";
         findings.add(codes::CURVES_IN_NOISE, None, message, help);

@@ -16,15 +16,11 @@ const OUTPUT_NAMES: [&[&str]; 2] = [
 #[must_use]
 pub fn description(ir: &Ir) -> String {
     let (name, digest, version) = (&ir.name, &ir.digest, &ir.specgen_version);
+    let (kind, bits) = (if ir.task_space.is_some() { "platform" } else { "legs" }, ir.scalar.bits());
+    let (leg_gain, period, grid) = (ir.defaults.leg_gain, ir.defaults.period, ir.hysteresis.grid);
+    let (low, high) = (ir.actuation.voltage[0], ir.actuation.voltage[1]);
     let about = format!(
-        "name={name}\ndigest={digest}\nversion={version}\nkind={}\nscalar_bits={}\nleg_gain={:?}\nperiod={:?}\ngrid={}\ndrive_range={:?},{:?}\n",
-        if ir.task_space.is_some() { "platform" } else { "legs" },
-        ir.scalar.bits(),
-        ir.defaults.leg_gain,
-        ir.defaults.period,
-        ir.hysteresis.grid,
-        ir.actuation.voltage[0],
-        ir.actuation.voltage[1],
+        "name={name}\ndigest={digest}\nversion={version}\nkind={kind}\nscalar_bits={bits}\nleg_gain={leg_gain:?}\nperiod={period:?}\ngrid={grid}\ndrive_range={low:?},{high:?}\n"
     );
     let [inputs, outputs] = match &ir.task_space {
         None => [&legs::tick::INPUT_NAMES[..], &legs::tick::OUTPUT_NAMES],

@@ -91,12 +91,10 @@ impl<P: Port> Session<P> {
     pub fn open(port: P, timeout: Timeout, digest: Option<&str>) -> Result<Self, OpenError> {
         let OpenSession { client, identity, text, description } = pil::open(port, timeout)?;
         if digest.is_some_and(|digest| digest != description.digest) {
+            let (name, theirs, ours) = (&description.name, &description.digest, digest.unwrap_or_default());
             return Err(OpenError::Other(format!(
-                "the device runs the controller `{}` of spec digest {}; the spec gives {}: name the spec that it was built from, \
-                 or build and flash it from this one",
-                description.name,
-                description.digest,
-                digest.unwrap_or_default()
+                "the device runs the controller `{name}` of spec digest {theirs}; the spec gives {ours}: name the spec that it was built from, \
+                 or build and flash it from this one"
             )));
         }
         let period = text.lines().find_map(|line| line.strip_prefix("period=")).and_then(|text| text.parse().ok());

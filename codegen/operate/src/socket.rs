@@ -1,14 +1,13 @@
 //! A device at a Unix stream socket, with the same frames as on a serial line.
 
-use std::io::{self, ErrorKind, Read, Write};
+use std::io::{self, ErrorKind, Write};
 use std::os::unix::net::UnixStream;
 use std::path::Path;
 use std::time::Duration;
 
-use rustix::event::PollFlags;
 use specgen_link::client::Port;
 
-use crate::pil::wait::ready;
+use crate::pil::wait::receive;
 
 /// Timeout of sending.
 const SEND: Duration = Duration::from_secs(2);
@@ -44,13 +43,6 @@ impl Port for SocketLine {
     }
 
     fn receive(&mut self, buffer: &mut [u8], limit: Duration) -> io::Result<usize> {
-        if !ready(&self.stream, PollFlags::IN, limit)? {
-            return Ok(0);
-        }
-        match self.stream.read(buffer) {
-            Ok(0) => Err(io::Error::new(ErrorKind::UnexpectedEof, "the program at the socket closed the connection")),
-            Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::Interrupted) => Ok(0),
-            other => other,
-        }
+        receive(&mut self.stream, buffer, limit, "the program at the socket closed the connection")
     }
 }

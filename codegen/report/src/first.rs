@@ -49,12 +49,9 @@ pub fn of(
     mode: u32,
 ) -> Vec<Part> {
     let sentence = Sentence::of(verdict);
-    let mut parts = vec![Part::Html(format!(
-        "{}<div class=\"first\">\n{}{}",
-        sentence.html(&compiled.findings),
-        tightest(verdict, &errors.text),
-        reach_card(compiled, verdict)
-    ))];
+    let (headline, limits) = (sentence.html(&compiled.findings), tightest(verdict, &errors.text));
+    let reach = reach_card(compiled, verdict);
+    let mut parts = vec![Part::Html(format!("{headline}<div class=\"first\">\n{limits}{reach}"))];
     parts.extend(error_card(verdict, errors));
     parts.extend(platform_card(
         &compiled.model,
@@ -163,12 +160,10 @@ fn controller_card(compiled: &Compilation, verdict: &Verdict, measured: Result<&
             content += &text_row("bits", &text, if good { "ok" } else { "error" });
             if let Some(step) = m.stage("step") {
                 let period = compiled.model.timing.period;
-                let text = format!(
-                    "{} in {}\u{2009}µs: core ≥ {} MIPS",
-                    thin(&group(step.max)),
-                    short(period * 1e6).trim_end_matches(".0"),
-                    short(step.max as f64 / period * 1e-6)
-                );
+                let instructions = thin(&group(step.max));
+                let microseconds = short(period * 1e6).trim_end_matches(".0").to_owned();
+                let speed = short(step.max as f64 / period * 1e-6);
+                let text = format!("{instructions} in {microseconds}\u{2009}µs: core ≥ {speed} MIPS");
                 content += &text_row("worst tick", &text, "none");
             }
         }

@@ -181,15 +181,11 @@ pub(crate) fn moved_over_requested(
 
 impl InverseResidual {
     fn chart(&self, leg: usize, own: &TrackedPath) -> Chart {
+        let (name, speed, slope) = (&own.name, own.speed(), digits(self.line.slope));
+        let offset = short(self.line.offset * 1e9);
         let mut chart = Chart::new(
             &format!("behind-{leg}"),
-            &format!(
-                "Residual of the inverse model: leg {leg}, {}, {}; λ {}, δ {} nm",
-                own.name,
-                own.speed(),
-                digits(self.line.slope),
-                short(self.line.offset * 1e9)
-            ),
+            &format!("Residual of the inverse model: leg {leg}, {name}, {speed}; λ {slope}, δ {offset} nm"),
             Axis::linear("virtual voltage", "V"),
             Axis::linear("residual", "nm"),
         )

@@ -47,15 +47,11 @@ pub fn everett(identified: &Identification, choice: Option<&GridChoice>, validat
     if let Some(validation) = validation {
         panels.extend(error(validation));
     }
+    let (grid, percent, range) = (report.grid, report.fit_rms_percent, report.displacement_range * 1e6);
+    let (noise, drift, dead_time) = (report.noise_floor * 1e9, report.drift * 1e9, report.dead_time * 1e3);
+    let excited = report.excited_share * 100.0;
     let subtitle = format!(
-        "N = {}; fit {:.3} % of {:.2} µm; noise {:.2} nm; drift {:.3} nm/s; dead time {:.3} ms; {:.1} % of the plane excited",
-        report.grid,
-        report.fit_rms_percent,
-        report.displacement_range * 1e6,
-        report.noise_floor * 1e9,
-        report.drift * 1e9,
-        report.dead_time * 1e3,
-        report.excited_share * 100.0
+        "N = {grid}; fit {percent:.3} % of {range:.2} µm; noise {noise:.2} nm; drift {drift:.3} nm/s; dead time {dead_time:.3} ms; {excited:.1} % of the plane excited"
     );
     figure(&format!("Everett table of {}", shortened(&report.record)), &subtitle, &panels, 2)
 }
@@ -218,13 +214,10 @@ pub fn linear(report: &LinearReport, records: &[Record]) -> String {
         Mark::Dots(3.5),
         widths,
     );
-    let subtitle = format!(
-        "reference gain {:.5} µm/V at {:.4} Hz; λ = ρ/ρ̂ from {:.4} to {:.4}",
-        report.reference_gain * 1e6,
-        report.reference_frequency,
-        report.gain_ratio[0],
-        report.gain_ratio[1]
-    );
+    let (per_volt, frequency, low) = (report.reference_gain * 1e6, report.reference_frequency, report.gain_ratio[0]);
+    let high = report.gain_ratio[1];
+    let subtitle =
+        format!("reference gain {per_volt:.5} µm/V at {frequency:.4} Hz; λ = ρ/ρ̂ from {low:.4} to {high:.4}");
     figure("Linear relation of displacement and drive", &subtitle, &[loops, rest, gain, width], 2)
 }
 
@@ -280,19 +273,12 @@ pub fn response(Estimate { record, value: report, .. }: &Estimate<FrequencyRespo
             .colored(PURPLE);
     coherence.y_limits = Some([0.0, 1.05]);
     let f = &report.fitted;
+    let (hertz, hertz_error, ratio) = (f.resonance.value, f.resonance.error, f.damping_ratio.value);
+    let (ratio_error, lag, lag_error) = (f.damping_ratio.error, f.lag.value * 1e3, f.lag.error * 1e3);
+    let (dead_time, dead_time_error, gain) = (f.dead_time.value * 1e3, f.dead_time.error * 1e3, f.gain.value * 1e6);
+    let (segments, segment) = (report.segments, report.segment);
     let subtitle = format!(
-        "resonance {:.2} ± {:.1e} Hz; ζ {:.4} ± {:.1e}; lag {:.4} ± {:.1e} ms; dead time {:.4} ± {:.1e} ms; gain {:.5} µm/V; {} segments of {}",
-        f.resonance.value,
-        f.resonance.error,
-        f.damping_ratio.value,
-        f.damping_ratio.error,
-        f.lag.value * 1e3,
-        f.lag.error * 1e3,
-        f.dead_time.value * 1e3,
-        f.dead_time.error * 1e3,
-        f.gain.value * 1e6,
-        report.segments,
-        report.segment
+        "resonance {hertz:.2} ± {hertz_error:.1e} Hz; ζ {ratio:.4} ± {ratio_error:.1e}; lag {lag:.4} ± {lag_error:.1e} ms; dead time {dead_time:.4} ± {dead_time_error:.1e} ms; gain {gain:.5} µm/V; {segments} segments of {segment}"
     );
     figure(&format!("Frequency response of {}", shortened(record)), &subtitle, &[magnitude, phase, coherence], 2)
 }
@@ -316,13 +302,12 @@ pub fn gauge(Estimate { record, value: report, .. }: &Estimate<GaugeCalibration>
     let degrees = panel("Held-out points", Axis::linear("degree", ""), Axis::log("held-out error", "nm rms"))
         .with("error", Mark::Line(1.5), errors)
         .with("chosen", Mark::Dots(5.0), chosen);
+    let (degree, rms, most) = (report.degree, report.residual_rms * 1e9, report.residual_max * 1e9);
+    let hysteresis =
+        report.hysteresis.map_or_else(|| "unknown (no reversal)".to_owned(), |h| format!("{:.2} nm", h * 1e9));
+    let slope = report.least_slope_percent;
     let subtitle = format!(
-        "degree {}; residual {:.2} nm rms, at most {:.2} nm; hysteresis {}; smallest slope {:.1} % of the mean",
-        report.degree,
-        report.residual_rms * 1e9,
-        report.residual_max * 1e9,
-        report.hysteresis.map_or_else(|| "unknown (no reversal)".to_owned(), |h| format!("{:.2} nm", h * 1e9)),
-        report.least_slope_percent
+        "degree {degree}; residual {rms:.2} nm rms, at most {most:.2} nm; hysteresis {hysteresis}; smallest slope {slope:.1} % of the mean"
     );
     figure(&format!("Gauge calibration of {}", shortened(record)), &subtitle, &[calibration, rest, degrees], 2)
 }

@@ -80,10 +80,9 @@ fn lead(learned: &LearningResult, convergence: &Convergence) -> String {
         1 => format!("1 pass reduces the error of {case} from {first} to {best}\u{2009}nm"),
         many => format!("{many} passes reduce the error of {case} from {first} to {best}\u{2009}nm"),
     };
+    let (coverage, radius) = (&learned.passes[learned.best].coverage, short(convergence.radius));
     format!(
-        "{gained}, measured over {}. From {low} to {high}\u{2009}Hz each pass multiplies the error by at most {} on every machine within the declared intervals.",
-        learned.passes[learned.best].coverage,
-        short(convergence.radius)
+        "{gained}, measured over {coverage}. From {low} to {high}\u{2009}Hz each pass multiplies the error by at most {radius} on every machine within the declared intervals."
     )
 }
 

@@ -72,13 +72,11 @@ pub fn section(compiled: &Compilation, mode: u32, command: &str) -> Section {
         .min_by(|a, b| a.1.total_cmp(&b.1));
     let worst = worst.map_or_else(String::new, |(law, limit)| format!(" (worst mode: {}, {limit:.2})", name(law)));
     let lead = own.map_or_else(String::new, |own| {
+        let (law, gain_margin) = (name(law), or(own.gain_margin, "above the tested range"));
+        let (leg_margin, count) = (or(own.gain_ratio_limit, "more than 10"), design.margins.len());
+        let contact = if design.touching { "free and in contact with the declared work piece" } else { "free of contact" };
         format!(
-            "With {} the gain margin is {} and the leg-gain margin {}{worst}. {stable} of {} modes are stable, {}.",
-            name(law),
-            or(own.gain_margin, "above the tested range"),
-            or(own.gain_ratio_limit, "more than 10"),
-            design.margins.len(),
-            if design.touching { "free and in contact with the declared work piece" } else { "free of contact" }
+            "With {law} the gain margin is {gain_margin} and the leg-gain margin {leg_margin}{worst}. {stable} of {count} modes are stable, {contact}."
         )
     });
     let Some(loops) = bode(compiled, design, task, law) else {
@@ -129,10 +127,9 @@ fn border(compiled: &Compilation, design: &Design, law: ControlMode) -> Option<(
         .colored(INK)
         .noted(Note::Ring([actuator.resonance, actuator.damping_ratio], String::new()));
     (chart.keys, chart.y_limits) = (true, Some(DAMPING_RATIOS));
+    let (from_hertz, ratio) = (short(from), short(least));
     let text = format!(
-        "A structural mode that the model lacks leaves the loop stable if its ζ is above the line of its kind, at the nominal point and at every corner of stiffness, gain, lag and delay. The spec declares such modes from {} Hz on with ζ of at least {}: no line may enter the area above and to the right of the dashed line. The ring is actuator.resonance, which is also a mode of the legs: the line of the leg must be below it.",
-        short(from),
-        short(least)
+        "A structural mode that the model lacks leaves the loop stable if its ζ is above the line of its kind, at the nominal point and at every corner of stiffness, gain, lag and delay. The spec declares such modes from {from_hertz} Hz on with ζ of at least {ratio}: no line may enter the area above and to the right of the dashed line. The ring is actuator.resonance, which is also a mode of the legs: the line of the leg must be below it."
     );
     Some((chart, text))
 }

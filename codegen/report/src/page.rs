@@ -53,22 +53,19 @@ pub fn html(head: &Head, first: &[Part], sections: &[Section], evidence: &[Secti
     let (file, digest) = (escaped(&head.file), escaped(&head.digest));
     let short: String = head.digest.chars().take(16).collect();
     // Writing to a String cannot fail, here and below.
+    let (version, title) = (env!("CARGO_PKG_VERSION"), escaped(&head.title));
+    let (refused, digest_shown) = (if head.refused { " class=\"refused-page\"" } else { "" }, escaped(&short));
+    let versions = escaped(&head.versions);
     let _ = write!(
         page.out,
-        "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<meta name=\"generator\" content=\"specgen {}\">\n<title>{file}: {}</title>\n<link rel=\"icon\" href=\"data:,\">\n<style>\n{STYLE}</style>\n</head>\n<body{}>\n{MARKS}<header class=\"top\"><b>{file}</b><code title=\"{digest}\">{}</code><span class=\"versions\">{}</span>",
-        env!("CARGO_PKG_VERSION"),
-        escaped(&head.title),
-        if head.refused { " class=\"refused-page\"" } else { "" },
-        escaped(&short),
-        escaped(&head.versions),
+        "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<meta name=\"generator\" content=\"specgen {version}\">\n<title>{file}: {title}</title>\n<link rel=\"icon\" href=\"data:,\">\n<style>\n{STYLE}</style>\n</head>\n<body{refused}>\n{MARKS}<header class=\"top\"><b>{file}</b><code title=\"{digest}\">{digest_shown}</code><span class=\"versions\">{versions}</span>"
     );
     page.out.push_str("<nav>");
     if !first.is_empty() {
         page.out.push_str("<a href=\"#verdict\">Verdict</a>");
     }
-    for section in sections {
-        let _ = write!(page.out, "<a href=\"#{}\">{}</a>", section.id, escaped(&section.title));
-    }
+    page.out
+        .extend(sections.iter().map(|section| format!("<a href=\"#{}\">{}</a>", section.id, escaped(&section.title))));
     if let Some([href, text]) = &head.other {
         let _ = write!(page.out, "<a href=\"{}\">{}</a>", escaped(href), escaped(text));
     }
@@ -111,11 +108,10 @@ struct Page {
 impl Page {
     fn section(&mut self, section: &Section) {
         let chosen = if section.panes.is_empty() { "" } else { " data-choices" };
+        let (id, title) = (&section.id, escaped(&section.title));
         let _ = write!(
             self.out,
-            "<section id=\"{}\" class=\"card section\"{chosen}>\n<div class=\"head\"><h2>{}</h2><div class=\"tools\">",
-            section.id,
-            escaped(&section.title)
+            "<section id=\"{id}\" class=\"card section\"{chosen}>\n<div class=\"head\"><h2>{title}</h2><div class=\"tools\">"
         );
         let depth = section.panes.first().map_or(0, |pane| pane.values.len());
         for axis in 0..depth {
@@ -147,13 +143,10 @@ impl Page {
         let _ = write!(self.out, "<span class=\"choice\" data-axis=\"{axis}\">");
         for value in values {
             let on = if *value == first { (" class=\"on\"", true) } else { ("", false) };
+            let (class, pressed, data, shown) = (on.0, on.1, escaped(&joined(value)), marked(value));
             let _ = write!(
                 self.out,
-                "<button type=\"button\"{} aria-pressed=\"{}\" data-value=\"{}\">{}</button>",
-                on.0,
-                on.1,
-                escaped(&joined(value)),
-                marked(value)
+                "<button type=\"button\"{class} aria-pressed=\"{pressed}\" data-value=\"{data}\">{shown}</button>"
             );
         }
         self.out.push_str("</span>");
@@ -175,21 +168,19 @@ impl Page {
                 Part::Chart(chart) => {
                     self.keep(chart);
                     self.figures += 1;
+                    let (id, title) = (&chart.id, marked(&chart.title));
                     let _ = writeln!(
                         self.out,
-                        "<figure class=\"plot only\" data-plot=\"{}\"><figcaption>{}</figcaption></figure>",
-                        chart.id,
-                        marked(&chart.title)
+                        "<figure class=\"plot only\" data-plot=\"{id}\"><figcaption>{title}</figcaption></figure>"
                     );
                 }
                 Part::Multiples(multiples) => self.multiples(multiples),
                 Part::Rows(rows) => {
                     self.figures += 1;
+                    let (id, title) = (&rows.id, marked(&rows.title));
                     let _ = writeln!(
                         self.out,
-                        "<figure class=\"rows\" data-rows=\"{}\"><figcaption>{}</figcaption></figure>",
-                        rows.id,
-                        marked(&rows.title)
+                        "<figure class=\"rows\" data-rows=\"{id}\"><figcaption>{title}</figcaption></figure>"
                     );
                     let mut data = rows.data.clone();
                     data["title"] = Value::String(rows.title.clone());
@@ -236,9 +227,9 @@ impl Page {
         let many = if multiples.items.len() > 6 || multiples.groups.len() == 1 { " many" } else { "" };
         let _ = writeln!(self.out, "</div>\n<div class=\"small{many}\">");
         if multiples.groups.len() == 2 {
-            for group in &multiples.groups {
-                let _ = writeln!(self.out, "<p class=\"caption\">{}</p>", marked(&group.title));
-            }
+            self.out.extend(
+                multiples.groups.iter().map(|group| format!("<p class=\"caption\">{}</p>\n", marked(&group.title))),
+            );
         }
         // Groups are columns; the script finds the figures by their order.
         for (k, charts) in multiples.items.iter().enumerate() {
@@ -312,9 +303,7 @@ fn write_table(out: &mut String, grid: &Grid) {
     out.push_str("</tr></thead>\n<tbody>\n");
     for row in &grid.rows {
         out.push_str("<tr>");
-        for (column, text) in row.iter().enumerate() {
-            let _ = write!(out, "<td{}>{}</td>", class(column), escaped(text));
-        }
+        out.extend(row.iter().enumerate().map(|(column, text)| format!("<td{}>{}</td>", class(column), escaped(text))));
         out.push_str("</tr>\n");
     }
     out.push_str("</tbody></table></div>\n");

@@ -440,11 +440,10 @@ fn timing(model: &Model, run: &Run) -> Section {
         table.push(vec![tick.to_string(), second(*tick), what.clone()]);
     }
     table.rows.sort_by_key(|row| row[0].parse::<u64>().unwrap_or_default());
+    let (late, all) = (late.len(), thin(&group(run.recorded.len() as u64)));
+    let missing = run.gaps.iter().map(|(from, to)| to - from).sum::<u64>();
     let mut section = Section::new("timing", "Late ticks", "").lead(&format!(
-        "{} of {} ticks were late or skipped on the machine; {} are missing in the record.",
-        late.len(),
-        thin(&group(run.recorded.len() as u64)),
-        run.gaps.iter().map(|(from, to)| to - from).sum::<u64>()
+        "{late} of {all} ticks were late or skipped on the machine; {missing} are missing in the record."
     ));
     for damaged in &run.damaged {
         section = section.text(damaged);

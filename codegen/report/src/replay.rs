@@ -114,14 +114,11 @@ pub fn same_build(
     if recorded.digest == compiled.ir.digest && recorded.version == version {
         return Ok(());
     }
+    let (recording, digest, built_by) = (recording.display(), &recorded.digest, &recorded.version);
+    let (spec, own_digest) = (spec.display(), &compiled.ir.digest);
     Err(Failure::Gate(format!(
-        "{} was recorded with spec digest {}, specgen {}, but {} has {}, specgen {version}: give the spec that the target was built from, and \
-         use the specgen that built it",
-        recording.display(),
-        recorded.digest,
-        recorded.version,
-        spec.display(),
-        compiled.ir.digest,
+        "{recording} was recorded with spec digest {digest}, specgen {built_by}, but {spec} has {own_digest}, specgen {version}: give the spec that the target was built from, and \
+         use the specgen that built it"
     )))
 }
 
@@ -253,9 +250,7 @@ impl Outcome for Report {
             let last = to.saturating_sub(1);
             let _ = writeln!(out, "  ticks {from} to {last} are missing; the record continues after them");
         }
-        for (block, reason) in &self.damaged {
-            let _ = writeln!(out, "  block {block} is damaged: {reason}");
-        }
+        out.extend(self.damaged.iter().map(|(block, reason)| format!("  block {block} is damaged: {reason}\n")));
         if let Some(tick) = self.lost_from {
             let _ = writeln!(out, "  the file ends within a block: ticks from {tick} on are lost");
         }

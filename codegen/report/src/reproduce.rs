@@ -87,12 +87,8 @@ pub fn run(output: &Path, generations: u32, plot: &Plot, ui: &mut Ui) -> Result<
         Results { digests: [legs.ir.digest.clone(), reference.ir.digest.clone()], seed: SEED, tables, convergence };
     let files = results.files();
     write_folder(output, &files)?;
-    ui.progress(&format!(
-        "wrote {} files to {} after {:.0} s",
-        files.len(),
-        output.display(),
-        steps.begun.elapsed().as_secs_f64()
-    ));
+    let (count, folder, seconds) = (files.len(), output.display(), steps.begun.elapsed().as_secs_f64());
+    ui.progress(&format!("wrote {count} files to {folder} after {seconds:.0} s"));
     let chart = crate::paper::convergence::chart(&results.convergence);
     plot.show("Table 3", "the genetic algorithm", &[chart], ui)?;
     ui.result(&results);

@@ -338,11 +338,6 @@ impl Job<'_> {
 
 fn line(name: &str, at: &Progress) -> String {
     let best = at.best.map_or_else(|| "none yet".to_owned(), |cost| format!("{cost:.5} µm s²"));
-    format!(
-        "{name}: {} of {}, best cost {best}, {:.0} × real time, {:.0} s left",
-        at.done,
-        at.all,
-        at.speed,
-        at.left.as_secs_f64()
-    )
+    let (done, all, speed, left) = (at.done, at.all, at.speed, at.left.as_secs_f64());
+    format!("{name}: {done} of {all}, best cost {best}, {speed:.0} × real time, {left:.0} s left")
 }

@@ -74,23 +74,17 @@ pub fn value_row(label: &str, [asked, has, unit]: [&str; 3], share: f64, mark_na
     let tight = if share >= TIGHT { " tight" } else { "" };
     let over = if mark_name == "error" { " over" } else { "" };
     let unit = if unit.is_empty() { String::new() } else { format!("\u{2009}{unit}") };
+    let (label, bar, mark) = (marked(label), bar(share), mark(mark_name));
     format!(
-        "<div class=\"limit{over}\"><span>{}</span><span class=\"value\">{asked} <i>of</i> {has}{unit}</span>{}<span class=\"share{tight}\">{percent}\u{2009}%</span>{}</div>\n",
-        marked(label),
-        bar(share),
-        mark(mark_name)
+        "<div class=\"limit{over}\"><span>{label}</span><span class=\"value\">{asked} <i>of</i> {has}{unit}</span>{bar}<span class=\"share{tight}\">{percent}\u{2009}%</span>{mark}</div>\n"
     )
 }
 
 /// A row of a card with a text instead of a bar.
 #[must_use]
 pub fn text_row(label: &str, text: &str, mark_name: &str) -> String {
-    format!(
-        "<div class=\"limit plain\"><span>{}</span><span class=\"value\">{}</span>{}</div>\n",
-        marked(label),
-        marked(text),
-        mark(mark_name)
-    )
+    let (label, text, mark) = (marked(label), marked(text), mark(mark_name));
+    format!("<div class=\"limit plain\"><span>{label}</span><span class=\"value\">{text}</span>{mark}</div>\n")
 }
 
 /// The bar of a limit row; the part beyond the limit is hatched.
@@ -140,10 +134,9 @@ fn grouped(value: f64, unit: &str, decimals: usize) -> String {
 /// A card: title, note on the right, rows.
 #[must_use]
 pub fn card(title: &str, note: &str, class: &str, content: &str) -> String {
+    let (title, note) = (marked(title), marked(note));
     format!(
-        "<div class=\"card {class}\"><div class=\"head\"><h2>{}</h2><span class=\"note\">{}</span></div>\n{content}</div>\n",
-        marked(title),
-        marked(note)
+        "<div class=\"card {class}\"><div class=\"head\"><h2>{title}</h2><span class=\"note\">{note}</span></div>\n{content}</div>\n"
     )
 }
 
@@ -201,14 +194,11 @@ impl Sentence {
                 });
                 let why = beyond.iter().map(|figure| match (&figure.words, &figure.limit) {
                     (Some(words), _) => format!("{words}."),
-                    (None, Some(limit)) => format!(
-                        "{}: {} with a limit of {}\u{2009}{} ({}).",
-                        label(figure),
-                        thin(&figure.value_text()),
-                        thin(&figure.limit_text()),
-                        unit(figure),
-                        limit.from
-                    ),
+                    (None, Some(limit)) => {
+                        let (name, value) = (label(figure), thin(&figure.value_text()));
+                        let (limit, unit, from) = (thin(&figure.limit_text()), unit(figure), &limit.from);
+                        format!("{name}: {value} with a limit of {limit}\u{2009}{unit} ({from}).")
+                    }
                     (None, None) => String::new(),
                 });
                 Self {
@@ -230,15 +220,13 @@ impl Sentence {
             let s = if number == 1 { "" } else { "s" };
             format!("<span{zero}>{}<span><b>{number}</b> {word}{s}</span></span>", mark(sign))
         };
+        let (class, mark) = (if self.mark == "error" { " refused" } else { "" }, mark(self.mark));
+        let (verdict, why) = (marked(&self.verdict), marked(&self.why));
+        let errors = count(Severity::Error, "error", "error");
+        let warnings = count(Severity::Warning, "warning", "warning");
+        let notes = count(Severity::Note, "note", "note");
         format!(
-            "<div id=\"verdict\" class=\"card verdict{}\">{}<div><h1>{}</h1><p>{}</p></div><div class=\"counts\">{}{}{}</div></div>\n",
-            if self.mark == "error" { " refused" } else { "" },
-            mark(self.mark),
-            marked(&self.verdict),
-            marked(&self.why),
-            count(Severity::Error, "error", "error"),
-            count(Severity::Warning, "warning", "warning"),
-            count(Severity::Note, "note", "note"),
+            "<div id=\"verdict\" class=\"card verdict{class}\">{mark}<div><h1>{verdict}</h1><p>{why}</p></div><div class=\"counts\">{errors}{warnings}{notes}</div></div>\n"
         )
     }
 }
@@ -329,14 +317,12 @@ pub fn findings(title: &str, note: &str, findings: &[Diagnostic], source: &SpecS
         let count =
             if same.len() > 1 { format!("<div class=\"places\">{} places</div>", same.len()) } else { String::new() };
         let more = if same.len() > 1 { format!(" And {} more.", same.len() - 1) } else { String::new() };
+        let (class, mark) = (if row < SEEN { "" } else { " more" }, mark(name));
+        let (message, places) = (marked(&sentence(&first.message)), escaped(&places.join(", ")));
+        let help = marked(&pretty(&first.help));
         let _ = writeln!(
             content,
-            "<div class=\"finding{}\">{}<div><b>{code}</b>{count}</div><div>{}{more} <code class=\"soft\">{}</code></div><div><b>Do:</b> {}</div></div>",
-            if row < SEEN { "" } else { " more" },
-            mark(name),
-            marked(&sentence(&first.message)),
-            escaped(&places.join(", ")),
-            marked(&pretty(&first.help)),
+            "<div class=\"finding{class}\">{mark}<div><b>{code}</b>{count}</div><div>{message}{more} <code class=\"soft\">{places}</code></div><div><b>Do:</b> {help}</div></div>"
         );
     }
     if codes.is_empty() {
@@ -380,21 +366,15 @@ pub fn source(findings: &[Diagnostic], source: &SpecSource, accepted: bool) -> S
                 at
             };
             let (from, to) = (cut(span.start), cut(span.end));
-            let _ = writeln!(
-                content,
-                "<div class=\"bad\"><b>{number}</b><span>{}<u>{}</u>{}</span></div>",
-                escaped(&text[..from]),
-                escaped(&text[from..to]),
-                escaped(&text[to..])
-            );
+            let (before, bad, after) = (escaped(&text[..from]), escaped(&text[from..to]), escaped(&text[to..]));
+            let _ =
+                writeln!(content, "<div class=\"bad\"><b>{number}</b><span>{before}<u>{bad}</u>{after}</span></div>");
             if let Some(replacement) = first.replacement.as_ref().filter(|_| accepted) {
                 let line = format!("{}{replacement}{}", &text[..from], &text[to..]);
+                let (before, new, after) = (escaped(&text[..from]), escaped(replacement), escaped(&text[to..]));
                 let _ = writeln!(
                     content,
-                    "<div class=\"fix\"><b>+</b><span>{}<strong>{}</strong>{}   # checked: accepted</span></div>",
-                    escaped(&text[..from]),
-                    escaped(replacement),
-                    escaped(&text[to..])
+                    "<div class=\"fix\"><b>+</b><span>{before}<strong>{new}</strong>{after}   # checked: accepted</span></div>"
                 );
                 fix = Some(line);
             }
@@ -406,20 +386,15 @@ pub fn source(findings: &[Diagnostic], source: &SpecSource, accepted: bool) -> S
     let copy = fix.map_or_else(String::new, |line| {
         format!("<button type=\"button\" data-copy=\"{}\">Copy line</button>", escaped(line.trim()))
     });
+    let (message, help, code) = (marked(&sentence(&first.message)), marked(&pretty(&first.help)), &first.code);
+    let explained = marked(&title.1);
     let _ = writeln!(
         content,
-        "<p>{}</p><div class=\"do\"><span><b>Do:</b> {}</span><span>{copy}<button type=\"button\" data-toggle=\"explain\">Explain {}</button></span></div><p id=\"explain\" class=\"soft\" hidden>{}</p>",
-        marked(&sentence(&first.message)),
-        marked(&pretty(&first.help)),
-        first.code,
-        marked(&title.1)
+        "<p>{message}</p><div class=\"do\"><span><b>Do:</b> {help}</span><span>{copy}<button type=\"button\" data-toggle=\"explain\">Explain {code}</button></span></div><p id=\"explain\" class=\"soft\" hidden>{explained}</p>"
     );
+    let (mark, code, title, place) = (mark("error"), &first.code, marked(&capital(&title.0)), escaped(&place));
     format!(
-        "<div class=\"card wide\"><div class=\"head\">{}<h2>{} {}</h2><span class=\"note\">{}</span></div>\n{content}</div>\n",
-        mark("error"),
-        first.code,
-        marked(&capital(&title.0)),
-        escaped(&place)
+        "<div class=\"card wide\"><div class=\"head\">{mark}<h2>{code} {title}</h2><span class=\"note\">{place}</span></div>\n{content}</div>\n"
     )
 }
 

@@ -20,8 +20,6 @@ mod platform;
 #[cfg(test)]
 mod tests;
 
-use std::fmt;
-
 use host_sim::controller::{Controller, ControllerError, Engine};
 use specgen_ir::constants;
 use specgen_ir::scalar::Numbers as _;
@@ -96,27 +94,12 @@ fn dynamics_in<T: common::Number + Into<f64>>(ir: &Ir, motion: &Motion<f64>) -> 
 }
 
 /// An IR that is not one from the compiler.
-#[derive(Debug)]
+#[derive(Debug, thiserror::Error)]
 pub enum InvalidIr {
     /// A part of it is out of range.
+    #[error("the compiled spec cannot be run: {0}")]
     Part(&'static str),
     /// Its description or configuration is invalid.
-    Controller(ControllerError),
-}
-
-impl fmt::Display for InvalidIr {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Part(part) => write!(f, "the compiled spec cannot be run: {part}"),
-            Self::Controller(error) => error.fmt(f),
-        }
-    }
-}
-
-impl std::error::Error for InvalidIr {}
-
-impl From<ControllerError> for InvalidIr {
-    fn from(error: ControllerError) -> Self {
-        Self::Controller(error)
-    }
+    #[error(transparent)]
+    Controller(#[from] ControllerError),
 }

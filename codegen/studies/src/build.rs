@@ -231,14 +231,9 @@ impl Summary {
         // Writing to a String cannot fail.
         let _ = writeln!(out, "{} → {} (f{}, digest {})", self.name, self.output, self.bits, &self.digest[..16]);
         out.push_str(&self.found);
-        let _ = writeln!(
-            out,
-            "  tables: {} Everett table{} of N = {}, {} bytes",
-            self.tables,
-            if self.tables == 1 { "" } else { "s" },
-            self.grid,
-            group(self.table_bytes as u64)
-        );
+        let (tables, plural, grid) = (self.tables, if self.tables == 1 { "" } else { "s" }, self.grid);
+        let bytes = group(self.table_bytes as u64);
+        let _ = writeln!(out, "  tables: {tables} Everett table{plural} of N = {grid}, {bytes} bytes");
         if let Some(library) = &self.host_library {
             let _ = writeln!(out, "  host library: {library} (links only without a panic path)");
         }
@@ -247,14 +242,11 @@ impl Summary {
             bytes.map_or("unbounded".to_owned(), |bytes| format!("at most {}{} bytes", group(bytes), of(budget.stack)))
         };
         let flash = |out: &mut String, [all, code, constants, tick]: [u64; 4]| {
+            let (used, limit, code_bytes) = (group(all), of(budget.flash), group(code));
+            let (constant_bytes, reached) = (group(constants), group(tick));
             let _ = writeln!(
                 out,
-                "    flash         {}{} bytes: {} code, {} constants; the tick reaches {} bytes of code",
-                group(all),
-                of(budget.flash),
-                group(code),
-                group(constants),
-                group(tick)
+                "    flash         {used}{limit} bytes: {code_bytes} code, {constant_bytes} constants; the tick reaches {reached} bytes of code"
             );
         };
         if let Some(i) = &self.image {
@@ -273,23 +265,14 @@ impl Summary {
                 |ram| format!("{}{} bytes including the tick's stack", group(ram), of(budget.ram)),
             );
             let _ = writeln!(out, "    RAM           {ram}, of which State {}", group(m.state));
-            let _ = writeln!(
-                out,
-                "    tick stack    {} (static), {} measured",
-                bound(m.stack_bound),
-                group(m.stack_painted)
-            );
+            let (bound, measured) = (bound(m.stack_bound), group(m.stack_painted));
+            let _ = writeln!(out, "    tick stack    {bound} (static), {measured} measured");
             for stage in &m.stages {
                 let budget = if stage.name == "step" { of(budget.instructions) } else { String::new() };
-                let _ = writeln!(
-                    out,
-                    "    {:<13} {}{budget} instructions mean, {} to {} ({} calls)",
-                    stage.name,
-                    group(stage.mean.round() as u64),
-                    group(stage.min),
-                    group(stage.max),
-                    group(stage.calls)
-                );
+                let (name, mean, least) = (&stage.name, group(stage.mean.round() as u64), group(stage.min));
+                let (most, calls) = (group(stage.max), group(stage.calls));
+                let _ =
+                    writeln!(out, "    {name:<13} {mean}{budget} instructions mean, {least} to {most} ({calls} calls)");
             }
             if let Some(estimate) = &m.time {
                 let _ = writeln!(out, "  {}:\n{}", estimate.board, firmware::time::text(estimate).trim_end());

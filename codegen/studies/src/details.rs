@@ -37,11 +37,10 @@ pub fn of(compiled: &Compilation) -> String {
     }
     for one in lead::of(compiled) {
         let LeadOf { name, lead, best, errors: [error, least] } = &one;
+        let (milliseconds, error_nm) = (lead * 1e3, error * 1e9);
         let _ = write!(
             text,
-            "  trajectory {name}: lead {:.4} ms gives {:.1} nm rms error by the model",
-            lead * 1e3,
-            error * 1e9
+            "  trajectory {name}: lead {milliseconds:.4} ms gives {error_nm:.1} nm rms error by the model"
         );
         let _ = if one.is_proposed() {
             writeln!(
@@ -60,14 +59,11 @@ pub fn of(compiled: &Compilation) -> String {
     text.push_str(&lower::describe_wiring(&compiled.model, &compiled.ir.supervision));
     for demand in &compiled.demands {
         let current = demand.current.map_or_else(String::new, |amperes| format!(", {:.3} A", amperes));
+        let (name, speed, slew) = (&demand.name, demand.leg_speed * 1e6, demand.slew * 1e-3);
+        let (allowed, deflection) = (compiled.model.actuator.slew_rate * 1e-3, demand.deflection * 1e9);
         let _ = writeln!(
             text,
-            "  trajectory {}: leg speed up to {:.1} um/s, using {:.3} of {:.3} V/ms{current}; deflection by inertia {:.2} nm",
-            demand.name,
-            demand.leg_speed * 1e6,
-            demand.slew * 1e-3,
-            compiled.model.actuator.slew_rate * 1e-3,
-            demand.deflection * 1e9
+            "  trajectory {name}: leg speed up to {speed:.1} um/s, using {slew:.3} of {allowed:.3} V/ms{current}; deflection by inertia {deflection:.2} nm"
         );
     }
     if let Some(task) = &compiled.ir.task_space {
@@ -86,16 +82,12 @@ pub fn of(compiled: &Compilation) -> String {
          {by_amplifiers} nm and {turned_by_amplifiers} nrad from amplifier noise"
     );
     if let (Some(noise), Some(task)) = (&compiled.pose_noise, &compiled.ir.task_space) {
+        let (reading, translation, rotation) = (noise.reading * 1e9, list(&noise.pose[..3]), list(&noise.pose[3..]));
+        let (legs, passes, metres) = (list(&noise.leg), task.sensing.passes, task.sensing.remainder[0]);
+        let radians = task.sensing.remainder[1];
         let _ = writeln!(
             text,
-            "  gauges: {:.2} nm rms each including quantisation; pose {} nm and {} nrad rms; legs {} nm rms; forward kinematics: {} iterations, error {:.1e} m, {:.1e} rad",
-            noise.reading * 1e9,
-            list(&noise.pose[..3]),
-            list(&noise.pose[3..]),
-            list(&noise.leg),
-            task.sensing.passes,
-            task.sensing.remainder[0],
-            task.sensing.remainder[1]
+            "  gauges: {reading:.2} nm rms each including quantisation; pose {translation} nm and {rotation} nrad rms; legs {legs} nm rms; forward kinematics: {passes} iterations, error {metres:.1e} m, {radians:.1e} rad"
         );
     }
     text

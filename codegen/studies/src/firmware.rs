@@ -400,12 +400,12 @@ fn check_budget(made: &mut BuildResult, compiled: &Compilation, target: Target) 
     }
     made.used = used;
     if let Some(stack) = made.stack.as_ref().filter(|stack| stack.needed() > stack.reserved) {
+        let needed = group(stack.needed());
+        let when = if stack.startup > stack.running { "initialisation" } else { "tick and nested interrupts" };
+        let reserved = group(stack.reserved);
         made.failures.push(format!(
-            "the program's stack needs {} bytes ({}), but its memory map reserves {}: make State and settings smaller \
-             (hysteresis.memory), or STACK in memory.x larger",
-            group(stack.needed()),
-            if stack.startup > stack.running { "initialisation" } else { "tick and nested interrupts" },
-            group(stack.reserved)
+            "the program's stack needs {needed} bytes ({when}), but its memory map reserves {reserved}: make State and settings smaller \
+             (hysteresis.memory), or STACK in memory.x larger"
         ));
     }
     let faults = made.checks.iter().chain(measured.map(|m| &m.checks)).flat_map(|checks| &checks.faults);

@@ -450,24 +450,12 @@ impl Outcome for Lesson {
             let Pass { translation_nm, orientation_nrad, measured_nm, status, .. } = pass;
             let notes = [if number == learned.best { "kept" } else { "" }.to_owned(), status_words(*status)];
             let notes: Vec<String> = notes.into_iter().filter(|text| !text.is_empty()).collect();
-            row(
-                &mut text,
-                &columns,
-                &[
-                    &number,
-                    &format_args!("{translation_nm:.1}"),
-                    &format_args!("{orientation_nrad:.0}"),
-                    &format_args!("{measured_nm:.1}"),
-                    &notes.join(", "),
-                ],
-            );
+            let [translation, gauges] = [translation_nm, measured_nm].map(|nm| format!("{nm:.1}"));
+            let orientation = format!("{orientation_nrad:.0}");
+            row(&mut text, &columns, &[&number, &translation, &orientation, &gauges, &notes.join(", ")]);
         }
-        for line in kept(learned) {
-            let _ = writeln!(text, "  {line}");
-        }
-        for help in help {
-            let _ = writeln!(text, "help: {help}");
-        }
+        text.extend(kept(learned).into_iter().map(|line| format!("  {line}\n")));
+        text.extend(help.iter().map(|help| format!("help: {help}\n")));
         text.lines().map(|line| format!("{}\n", line.trim_end())).collect()
     }
 }

@@ -27,12 +27,10 @@ pub fn judge(compiled: &Compilation, hertz: f64, samples: u32) -> Result<(), Fai
     model.timing.period = 1.0 / hertz / f64::from(samples);
     let Err(findings) = stability::check(&model) else { return Ok(()) };
     let why = findings.first().map_or("", |finding| finding.message.as_str());
+    let (interval, own, samples_of_period) = (model.timing.period * 1e6, period * 1e6, 1.0 / hertz / period);
     Err(Failure::Gate(format!(
-        "--samples {samples} at {hertz} Hz gives an interval of {:.1} µs instead of the {:.1} µs of timing.period, for which {why}. Use \
-         --samples {:.0}, which is timing.period",
-        model.timing.period * 1e6,
-        period * 1e6,
-        1.0 / hertz / period
+        "--samples {samples} at {hertz} Hz gives an interval of {interval:.1} µs instead of the {own:.1} µs of timing.period, for which {why}. Use \
+         --samples {samples_of_period:.0}, which is timing.period"
     )))
 }
 

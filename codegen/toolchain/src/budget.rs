@@ -83,14 +83,9 @@ pub fn over(target: &Target, used: &ImageUsage) -> Vec<String> {
         };
         let subject = if what == "instructions" { "instruction count is".to_owned() } else { format!("{what} uses") };
         let verb = if from.contains('.') { "allows" } else { "has" };
-        over.push(format!(
-            "{subject} {}{} {unit}, {from} {verb} {}: reduce it by {}{}",
-            if what == "RAM" && used.ram.is_none() { "at least " } else { "" },
-            group(amount),
-            group(most),
-            group(amount - most),
-            users(by, amount)
-        ));
+        let (least, used) = (if what == "RAM" && used.ram.is_none() { "at least " } else { "" }, group(amount));
+        let (limit, excess, by) = (group(most), group(amount - most), users(by, amount));
+        over.push(format!("{subject} {least}{used} {unit}, {from} {verb} {limit}: reduce it by {excess}{by}"));
     }
     if target.budget.stack.is_some() && used.stack.is_none() {
         over.push("the stack of a tick cannot be bounded".to_owned());

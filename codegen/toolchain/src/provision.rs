@@ -47,10 +47,8 @@ fn provision_in(places: &Places, say: &mut dyn FnMut(&str)) -> Result<Tools, Tar
 fn compiler(places: &Places, say: &mut dyn FnMut(&str)) -> Result<Toolchain, TargetError> {
     let find = || toolchain::find_in(places);
     let mut search = Search { places, say, tried: Vec::new() };
-    if let Some(found) = search.already(&find) {
-        return Ok(found);
-    }
-    if let Some(found) = search.way("rustup target add", &find, rustup) {
+    let found = search.already(&find).or_else(|| search.way("rustup target add", &find, rustup));
+    if let Some(found) = found {
         return Ok(found);
     }
     let mut packages = toolchain::PACKAGES.to_vec();
@@ -63,10 +61,7 @@ fn compiler(places: &Places, say: &mut dyn FnMut(&str)) -> Result<Toolchain, Tar
 fn emulator(places: &Places, say: &mut dyn FnMut(&str)) -> Result<Emulator, TargetError> {
     let find = || Emulator::find_in(places);
     let mut search = Search { places, say, tried: Vec::new() };
-    if let Some(found) = search.already(&find) {
-        return Ok(found);
-    }
-    let found = search.debian(&[emulator::PROGRAM], &find);
+    let found = search.already(&find).or_else(|| search.debian(&[emulator::PROGRAM], &find));
     found.ok_or_else(|| search.failed("QEMU for ARM", emulator::install_command()))
 }
 
@@ -78,10 +73,7 @@ pub fn engine(say: &mut dyn FnMut(&str)) -> Result<PathBuf, TargetError> {
     let places = Places::here();
     let find = || engine::find_in(&places);
     let mut search = Search { places: &places, say, tried: Vec::new() };
-    if let Some(found) = search.already(&find) {
-        return Ok(found);
-    }
-    let found = search.debian(&[engine::PACKAGE], &find);
+    let found = search.already(&find).or_else(|| search.debian(&[engine::PACKAGE], &find));
     found.ok_or_else(|| search.failed("the Unicorn engine", engine::install_command()))
 }
 

@@ -143,11 +143,9 @@ fn replay_from(
         return Err(TargetError::BadRequest { text });
     }
     if stats.ticks != inputs.len() as u64 || words.len() != inputs.len() * row {
+        let (rows, ticks, words_read) = (inputs.len(), stats.ticks, words.len());
         let text = format!(
-            "{} input rows gave {} ticks and {} output words; expected {row} words per tick",
-            inputs.len(),
-            stats.ticks,
-            words.len()
+            "{rows} input rows gave {ticks} ticks and {words_read} output words; expected {row} words per tick"
         );
         return Err(TargetError::MalformedStats { text });
     }

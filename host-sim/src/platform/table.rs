@@ -179,9 +179,7 @@ impl PoseTable {
         for row in &self.rows {
             // Writing to a String cannot fail, here and below.
             let _ = write!(out, "{},{},{}", row.trajectory, row.mode, row.frequency_hz);
-            for value in row.rms_nano {
-                let _ = write!(out, ",{value:.4}");
-            }
+            out.extend(row.rms_nano.iter().map(|value| format!(",{value:.4}")));
             let Coverage { seconds, path_seconds } = row.coverage;
             let _ = writeln!(out, ",{:.4},{seconds:.6},{path_seconds:.6}", row.peak_nm);
         }
@@ -196,17 +194,13 @@ impl PoseTable {
         );
         for row in &self.rows {
             let _ = write!(out, "{:<8}{:>5} {:<10}", row.trajectory, row.frequency_hz, row.mode);
-            for value in with_norm(row.rms_nano) {
-                let _ = write!(out, "{value:>8.1}");
-            }
+            out.extend(with_norm(row.rms_nano).map(|value| format!("{value:>8.1}")));
             let Coverage { seconds, path_seconds } = row.coverage;
             let _ = writeln!(out, "{seconds:>8.3}{path_seconds:>8.3}");
             let paper = beside_paper.then(|| paper_rms(&row.trajectory, &row.mode, row.frequency_hz)).flatten();
             if let Some(paper) = paper {
                 let _ = write!(out, "{:<24}", "         paper");
-                for value in with_norm(paper) {
-                    let _ = write!(out, "{value:>8.0}");
-                }
+                out.extend(with_norm(paper).map(|value| format!("{value:>8.0}")));
                 out.push('\n');
             }
         }
@@ -323,16 +317,9 @@ impl MachiningTable {
         let mut out = String::from("mean error norm            nm      nrad  over s  path s");
         out.push_str(if beside_paper { "   paper nm      nrad\n" } else { "\n" });
         for row in &self.rows {
-            let _ = write!(
-                out,
-                "{:<11}{:<10}{:>8.2}{:>10.1}{:>8.3}{:>8.3}",
-                row.part,
-                row.mode,
-                row.translation_nm,
-                row.orientation_nrad,
-                row.coverage.seconds,
-                row.coverage.path_seconds
-            );
+            let (part, mode, nm, nrad) = (&row.part, &row.mode, row.translation_nm, row.orientation_nrad);
+            let (seconds, path) = (row.coverage.seconds, row.coverage.path_seconds);
+            let _ = write!(out, "{part:<11}{mode:<10}{nm:>8.2}{nrad:>10.1}{seconds:>8.3}{path:>8.3}");
             let paper = beside_paper.then(|| paper_machining(&row.part, &row.mode)).flatten();
             if let Some([nm, nrad]) = paper {
                 let _ = write!(out, "{nm:>11.0}{nrad:>10.1}");

@@ -244,16 +244,10 @@ fn report(board: &mut Board) -> String {
     for text in board.violations.lines() {
         println!("! {text}");
     }
+    let (ms, resets, enable) = (microseconds(board.now) / 1e3, board.resets, u8::from(board.enabled()));
+    let (conversions, instructions, stack) = (board.adc.conversions, board.instructions, board.stack);
+    let (metered, clock, violations) = (meter.text(), board.clock_text(), board.violations.lines().count());
     format!(
-        "time_ms={:.3} resets={} enable={} conversions={} instructions={} stack={:#x} {} {} violations={}",
-        microseconds(board.now) / 1e3,
-        board.resets,
-        u8::from(board.enabled()),
-        board.adc.conversions,
-        board.instructions,
-        board.stack,
-        meter.text(),
-        board.clock_text(),
-        board.violations.lines().count()
+        "time_ms={ms:.3} resets={resets} enable={enable} conversions={conversions} instructions={instructions} stack={stack:#x} {metered} {clock} violations={violations}"
     )
 }

@@ -71,12 +71,10 @@ impl Meter {
 
     /// Smallest/mean/largest of each.
     pub fn text(&self) -> String {
+        let (ticks, tick_us) = (self.ticks.count, self.ticks.text(microseconds));
+        let (instructions, latency) = (self.instructions.text(|count| count as f64), self.latency.text(microseconds));
         format!(
-            "ticks={} tick_us={} instructions={} convst_to_ldac_us={}",
-            self.ticks.count,
-            self.ticks.text(microseconds),
-            self.instructions.text(|count| count as f64),
-            self.latency.text(microseconds)
+            "ticks={ticks} tick_us={tick_us} instructions={instructions} convst_to_ldac_us={latency}"
         )
     }
 }

@@ -26,15 +26,11 @@ fn a_gauge_that_fails_holds_the_pose_and_its_return_makes_no_jump() {
                 assert_eq!(tick.measured, last.measured, "the last pose believed is held, to the bit");
             }
             let settled = worst(&after[LAP..]);
+            let (failing, returned, settled_nm) = (worst(&bad) * 1e9, worst(&after) * 1e9, settled * 1e9);
+            let (before, step_failing) = (error * 1e9, largest_step(&last, &bad) * 1e3);
+            let (step_after, step_before) = (largest_step(&bad[bad.len() - 1], &after) * 1e3, step * 1e3);
             println!(
-                "gauge {gauge} at {reading:e}: {:.0} nm while it fails, {:.0} nm on its return, {:.1} nm settled ({:.1} before); voltage steps {:.1} and {:.1} mV ({:.1} before)",
-                worst(&bad) * 1e9,
-                worst(&after) * 1e9,
-                settled * 1e9,
-                error * 1e9,
-                largest_step(&last, &bad) * 1e3,
-                largest_step(&bad[bad.len() - 1], &after) * 1e3,
-                step * 1e3
+                "gauge {gauge} at {reading:e}: {failing:.0} nm while it fails, {returned:.0} nm on its return, {settled_nm:.1} nm settled ({before:.1} before); voltage steps {step_failing:.1} and {step_after:.1} mV ({step_before:.1} before)"
             );
             // As far off as the inverse model alone leaves it, and back within a lap; no step of the voltages beyond what
             // catching up takes.
@@ -53,14 +49,11 @@ fn a_gauge_stuck_within_its_range_stays_within_limits_and_is_recovered_from() {
             let stuck = run.stream(LAP / 3);
             run.fault(gauge, None);
             let after = run.stream(2 * LAP);
+            let (at_once, later) = (worst(&stuck) * 1e9, worst(&after[500..]) * 1e9);
+            let (settled, before, status) = (worst(&after[LAP..]) * 1e9, error * 1e9, all_status(&stuck));
+            let status_after = all_status(&after);
             println!(
-                "gauge {gauge} stuck: {:.0} nm, {:.0} nm after 50 ms, {:.1} nm settled ({:.1} before), status {:x?} {:x?}",
-                worst(&stuck) * 1e9,
-                worst(&after[500..]) * 1e9,
-                worst(&after[LAP..]) * 1e9,
-                error * 1e9,
-                all_status(&stuck),
-                all_status(&after)
+                "gauge {gauge} stuck: {at_once:.0} nm, {later:.0} nm after 50 ms, {settled:.1} nm settled ({before:.1} before), status {status:x?} {status_after:x?}"
             );
             let limited = all_status(&stuck).iter().all(|status| status & !0x3f == 0);
             assert!(limited, "it cannot be distinguished from a gauge that works");
@@ -83,13 +76,9 @@ fn a_stream_that_dries_up_is_brought_to_rest_and_taken_up_again() {
         run.now += stale_ticks - 1;
         let (before, bridged) = (gap[gap.len() - 1], run.stream(LAP / 16));
         assert_eq!(all_status(&bridged), [0]);
-        println!(
-            "bridged gap: {:.1} nm ({:.1}), step {:.1} mV ({:.1})",
-            worst(&gap) * 1e9,
-            error * 1e9,
-            largest_step(&before, &bridged) * 1e3,
-            step * 1e3
-        );
+        let (gap_nm, error_nm, step_mv) = (worst(&gap) * 1e9, error * 1e9, largest_step(&before, &bridged) * 1e3);
+        let step_before = step * 1e3;
+        println!("bridged gap: {gap_nm:.1} nm ({error_nm:.1}), step {step_mv:.1} mV ({step_before:.1})");
         assert!(worst(&gap) < 2.0 * error && largest_step(&before, &bridged) < 2.0 * step);
 
         let held = Request { fresh: false, ..Request::stream(path(run.now)) };
@@ -164,13 +153,10 @@ fn a_set_point_that_jumps_is_no_number_or_lies_outside_is_held() {
             assert_eq!(all_status(&again), [0]);
             let peak = worse(worst(&held), worst(&stopping));
             let steps = largest_step(&before, &[&held[..], &stopping[..]].concat());
+            let (peak_nm, before, steps_mv, step_before) = (peak * 1e9, error * 1e9, steps * 1e3, step * 1e3);
+            let at_rest = rest.status & BUSY == 0;
             println!(
-                "{name} = {bad:e}: {:.0} nm ({:.1}), steps {:.1} mV ({:.1}), at rest: {}",
-                peak * 1e9,
-                error * 1e9,
-                steps * 1e3,
-                step * 1e3,
-                rest.status & BUSY == 0
+                "{name} = {bad:e}: {peak_nm:.0} nm ({before:.1}), steps {steps_mv:.1} mV ({step_before:.1}), at rest: {at_rest}"
             );
             assert!(peak < 2.0 * error && steps < 2.0 * step);
         }
@@ -278,13 +264,10 @@ fn a_wrench_that_cannot_be_is_not_believed() {
             let apart = before.iter().zip(&during).map(|(a, b)| (a - b).abs()).fold(0.0, worse);
             let after = run.ticks(200, &Request { fresh: true, ..Request::stream(path(run.now)) });
             assert_eq!(all_status(&after), [0]);
+            let (apart_nm, worst_nm, before) = (apart * 1e9, worse(worst(&faulty), worst(&after)) * 1e9, error * 1e9);
+            let (steps, step_before) = (largest_step(&last, &[&faulty[..], &after[..]].concat()) * 1e3, step * 1e3);
             println!(
-                "wrench[{axis}] = {bad:e}: load apart by {:.2} nm, {:.1} nm ({:.1}), steps {:.1} mV ({:.1})",
-                apart * 1e9,
-                worse(worst(&faulty), worst(&after)) * 1e9,
-                error * 1e9,
-                largest_step(&last, &[&faulty[..], &after[..]].concat()) * 1e3,
-                step * 1e3
+                "wrench[{axis}] = {bad:e}: load apart by {apart_nm:.2} nm, {worst_nm:.1} nm ({before:.1}), steps {steps:.1} mV ({step_before:.1})"
             );
             assert!(worse(worst(&faulty), worst(&after)) < 2.0 * error && apart < 20e-9);
             assert!(largest_step(&last, &[&faulty[..], &after[..]].concat()) < 0.2);
@@ -311,14 +294,11 @@ fn any_change_of_mode_in_motion_is_without_a_jump() {
                 run.set(&[("mode", f64::from(to))]);
                 let change = run.stream(2 * LAP);
                 let jump = largest_step(&last, &change[..1]);
+                let (jump_mv, steps, own_nm) = (jump * 1e3, largest_step(&last, &change) * 1e3, own * 1e9);
+                let (soon, later) = (worst(&change[..500]) * 1e9, worst(&change[LAP..]) * 1e9);
+                let status = all_status(&change);
                 println!(
-                    "mode {from} to {to}: jump {:.1} mV, steps {:.1} mV; {:.0} nm before, {:.0} nm within 50 ms, {:.0} nm after 0.2 s; {:x?}",
-                    jump * 1e3,
-                    largest_step(&last, &change) * 1e3,
-                    own * 1e9,
-                    worst(&change[..500]) * 1e9,
-                    worst(&change[LAP..]) * 1e9,
-                    all_status(&change)
+                    "mode {from} to {to}: jump {jump_mv:.1} mV, steps {steps:.1} mV; {own_nm:.0} nm before, {soon:.0} nm within 50 ms, {later:.0} nm after 0.2 s; {status:x?}"
                 );
                 // A code's worth, for the inverse of what a code gives may be that code or, by rounding, its neighbour.
                 assert!(jump <= CODE, "mode {from} to {to}: {jump} V");
@@ -360,14 +340,12 @@ fn settings_changed_in_flight_make_no_jump_and_bad_ones_change_nothing() {
             let before = run.stream(LAP / 4);
             run.set(settings);
             let change = run.stream(LAP);
+            let jump = largest_step(&before[before.len() - 1], &change[..1]) * 1e3;
+            let (steps, step_before) = (largest_step(&before[before.len() - 1], &change) * 1e3, step * 1e3);
+            let (soon, later) = (worst(&change[..500]) * 1e9, worst(&change[LAP / 2..]) * 1e9);
+            let before_nm = error * 1e9;
             println!(
-                "{what}: jump {:.1} mV, steps {:.1} mV ({:.1}), {:.0} nm within 50 ms, {:.0} nm after ({:.1})",
-                largest_step(&before[before.len() - 1], &change[..1]) * 1e3,
-                largest_step(&before[before.len() - 1], &change) * 1e3,
-                step * 1e3,
-                worst(&change[..500]) * 1e9,
-                worst(&change[LAP / 2..]) * 1e9,
-                error * 1e9
+                "{what}: jump {jump:.1} mV, steps {steps:.1} mV ({step_before:.1}), {soon:.0} nm within 50 ms, {later:.0} nm after ({before_nm:.1})"
             );
             let jump = largest_step(&before[before.len() - 1], &change[..1]);
             // A gain times the present error is no jump, but no bumpless change either.
@@ -418,12 +396,8 @@ fn narrower_voltage_limits_are_kept_to_at_the_slew_rate_and_left_without_windup(
         assert!(bits & 0x3f != 0 && bits & !0x3f == 0, "{bits:x}");
         run.set(&[("code_max", emitted().compiled.ir.actuation.code_max as f64)]);
         let after = run.stream(2 * LAP);
-        println!(
-            "limits: {:.0} nm on return, {:.1} nm after 0.2 s ({:.1} before)",
-            worst(&after) * 1e9,
-            worst(&after[LAP..]) * 1e9,
-            error * 1e9
-        );
+        let (soon, later, before) = (worst(&after) * 1e9, worst(&after[LAP..]) * 1e9, error * 1e9);
+        println!("limits: {soon:.0} nm on return, {later:.1} nm after 0.2 s ({before:.1} before)");
         assert_eq!(all_status(&after[LAP..]), [0]);
         assert!(worst(&after[LAP..]) < 1.3 * error && worst(&after) < 5e-6);
     });

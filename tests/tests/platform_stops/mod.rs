@@ -43,17 +43,12 @@ fn a_dry_stream_stands_soon_near_and_with_no_leg_limited() {
         for share in speeds() {
             let of: Vec<&StopRun> = ran.iter().filter(|one| one.share.abs() == *share).collect();
             let most = |figure: &dyn Fn(&StopRun) -> f64| of.iter().map(|one| figure(one)).fold(0.0, worse);
+            let (name, speed, time) = (&machine.name, 5.0 * share, most(&|one| one.time) * 1e3);
+            let (target, pose) = (most(&|one| one.target) * 1e6, most(&|one| one.pose) * 1e6);
+            let (worst, at_15) = (most(&|one| one.worst) * 1e6, most(&|one| one.at_15ms) * 1e6);
+            let (at_50, status) = (most(&|one| one.at_50ms) * 1e6, of.iter().fold(0, |bits, one| bits | one.status));
             println!(
-                "{:<14} {:>4.1} mm/s: stands after {:>4.1} ms; from where it counts as stale target {:.3} um, platform {:.3} um; off by {:.3} um at most, {:.3} um 15 ms, {:.3} um 50 ms after the last set-point; limited {:x}",
-                machine.name,
-                5.0 * share,
-                most(&|one| one.time) * 1e3,
-                most(&|one| one.target) * 1e6,
-                most(&|one| one.pose) * 1e6,
-                most(&|one| one.worst) * 1e6,
-                most(&|one| one.at_15ms) * 1e6,
-                most(&|one| one.at_50ms) * 1e6,
-                of.iter().fold(0, |bits, one| bits | one.status)
+                "{name:<14} {speed:>4.1} mm/s: stands after {time:>4.1} ms; from where it counts as stale target {target:.3} um, platform {pose:.3} um; off by {worst:.3} um at most, {at_15:.3} um 15 ms, {at_50:.3} um 50 ms after the last set-point; limited {status:x}"
             );
         }
         for one in ran {

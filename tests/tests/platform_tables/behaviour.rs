@@ -156,11 +156,9 @@ fn a_change_of_mode_moves_no_leg() {
             .collect();
         assert_eq!(steps.len(), 6 * from.len());
         let largest = |column: usize| steps.iter().map(|(.., step)| step[column]).fold(0.0, worse);
+        let (at_change, before, after) = (largest(0) * 1e3, largest(1) * 1e3, largest(2) * 1e3);
         println!(
-            "{what}: largest step at a change of mode {:.1} mV, of a tick before {:.1} mV, after {:.1} mV",
-            largest(0) * 1e3,
-            largest(1) * 1e3,
-            largest(2) * 1e3
+            "{what}: largest step at a change of mode {at_change:.1} mV, of a tick before {before:.1} mV, after {after:.1} mV"
         );
         for (from, to, [step, usual, _]) in steps {
             // A code more is what rounding takes.

@@ -205,3 +205,17 @@ pub fn reference_machine() -> &'static Bench {
     static MACHINE: OnceLock<Bench> = OnceLock::new();
     MACHINE.get_or_init(|| Bench::new("tables-reference", Specimen::reference(), &[]))
 }
+
+/// A motion that is faded in and out, each within `fade`: its part of the full size, and the first two derivatives by time.
+pub fn faded(time: f64, duration: f64, fade: f64) -> [f64; 3] {
+    let (inward, sign) = if time > 0.5 * duration { (duration - time, -1.0) } else { (time, 1.0) };
+    if inward >= fade {
+        return [1.0, 0.0, 0.0];
+    }
+    let (u, per_second) = (inward.max(0.0) / fade, 1.0 / fade);
+    [
+        u.powi(3) * (10.0 - 15.0 * u + 6.0 * u * u),
+        sign * per_second * 30.0 * u * u * (1.0 - u) * (1.0 - u),
+        per_second * per_second * 60.0 * u * (1.0 - u) * (1.0 - 2.0 * u),
+    ]
+}

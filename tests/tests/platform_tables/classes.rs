@@ -8,7 +8,7 @@ use host_sim::platform::{PlatformParameters, Specimen};
 use host_sim::trajectory::{PaperPath, PaperPose, PoseTarget, PoseTrajectory};
 use specgen_tests::{damped, length, skipped};
 
-use super::bench::{Bench, records, reference_machine};
+use super::bench::{Bench, faded, records, reference_machine};
 
 /// A circle in x and y that grows from its middle and shrinks to it again, each within `RAMP`.
 pub struct Circle {
@@ -20,20 +20,6 @@ impl Circle {
     const RADIUS: f64 = 5e-6;
     const RAMP: f64 = 0.04;
     const DURATION: f64 = 0.2;
-
-    /// Radius over the whole one, and its first two derivatives by time.
-    fn radius(time: f64) -> [f64; 3] {
-        let (inward, sign) = if time > 0.5 * Self::DURATION { (Self::DURATION - time, -1.0) } else { (time, 1.0) };
-        if inward >= Self::RAMP {
-            return [1.0, 0.0, 0.0];
-        }
-        let (u, per_second) = (inward.max(0.0) / Self::RAMP, 1.0 / Self::RAMP);
-        [
-            u.powi(3) * (10.0 - 15.0 * u + 6.0 * u * u),
-            sign * per_second * 30.0 * u * u * (1.0 - u) * (1.0 - u),
-            per_second * per_second * 60.0 * u * (1.0 - u) * (1.0 - 2.0 * u),
-        ]
-    }
 }
 
 impl PoseTrajectory for Circle {
@@ -42,7 +28,7 @@ impl PoseTrajectory for Circle {
     }
 
     fn target(&self, time: f64) -> PoseTarget {
-        let [a, rate, bend] = Self::radius(time).map(|value| value * Self::RADIUS);
+        let [a, rate, bend] = faded(time, Self::DURATION, Self::RAMP).map(|value| value * Self::RADIUS);
         let angular = TAU * self.frequency;
         let mut target = PoseTarget::default();
         for (axis, phase) in [(0, TAU / 4.0), (1, 0.0)] {

@@ -85,11 +85,9 @@ fn corners_ask_for_less_lead_and_the_model_says_how_much() {
         let LeadOf { lead, best, errors, .. } = &found[0];
         let proposed = format!("{:.4} ms", best * 1e3);
         let [before, after] = [played(&usual).1, played(&bench(class, hertz, Some(&proposed), None)).1];
+        let (without, milliseconds, with) = (errors[0] * 1e9, lead * 1e3, errors[1] * 1e9);
         println!(
-            "{class}, case 1 at {hertz} Hz: by the model {:.1} nm with {:.3} ms, {:.1} with {proposed}; played {before:.1} -> {after:.1} nm",
-            errors[0] * 1e9,
-            lead * 1e3,
-            errors[1] * 1e9
+            "{class}, case 1 at {hertz} Hz: by the model {without:.1} nm with {milliseconds:.3} ms, {with:.1} with {proposed}; played {before:.1} -> {after:.1} nm"
         );
         assert!(best < lead && errors[1] < errors[0]);
         assert!(!found[0].is_proposed() || after <= 1.02 * before, "{before} {after}");

@@ -311,19 +311,9 @@ fn what_lag_and_modes_would_leave_is_prepared_by_the_model() {
         for ([size, time], most) in STEPS.into_iter().zip([6.5, 14.0]) {
             let [plain, prepared, handed, both] = [(usual(), false), (usual(), true), (bench, false), (bench, true)]
                 .map(|(bench, with)| settled(bench, [size, time], with));
+            let (um, ms) = (size * 1e6, time * 1e3);
             println!(
-                "{name}: step of {:.0} µm in {:.1} ms, settled to 10 nm (repeated): {:.1} ({:.1}) ms; prepared {:.1} ({:.1}); \
-                 integral handed over {:.1} ({:.1}); both {:.1} ({:.1})",
-                size * 1e6,
-                time * 1e3,
-                plain[0],
-                plain[1],
-                prepared[0],
-                prepared[1],
-                handed[0],
-                handed[1],
-                both[0],
-                both[1]
+                "{name}: step of {um:.0} µm in {ms:.1} ms, settled to 10 nm and repeated, ms: {plain:.1?}; prepared {prepared:.1?}; integral handed over {handed:.1?}; both {both:.1?}"
             );
             // Bouc-Wen legs on a branch of the way back are further from their table.
             let [first, repeated] = if class == 0 { [most; 2] } else { [most + 2.0, 18.0] };
@@ -391,12 +381,8 @@ fn every_machine_within_the_intervals_learns() {
         all.sort_by(f64::total_cmp);
         [all[all.len() / 2], all[all.len() - 1]]
     };
-    println!(
-        "{} machines, median and largest, nm: without {:.1?}, learned {:.1?}",
-        found.len(),
-        errors(|_| 0),
-        errors(|one| one.best)
-    );
+    let (count, without, learned) = (found.len(), errors(|_| 0), errors(|one| one.best));
+    println!("{count} machines, median and largest, nm: without {without:.1?}, learned {learned:.1?}");
     for (seed, learned) in found.iter().enumerate() {
         let [first, best, last] =
             [0, learned.best, learned.passes.len() - 1].map(|pass| learned.passes[pass].translation_nm);
@@ -462,15 +448,11 @@ fn where_there_is_nothing_to_learn_nothing_gets_worse() {
             let (first, best) = (&learned.passes[0], &learned.passes[learned.best]);
             let noise = learned.noise_nm.unwrap();
             let [bare, kept] = [&[][..], &learned.knots].map(|table| played(bench, &machine, &motion, table, spacing));
+            let (from, to, gauge_from) = (first.translation_nm, best.translation_nm, first.measured_nm);
+            let (gauge_to, ending, passes) = (best.measured_nm, learned.ending, learned.passes.len() - 1);
+            let kept_pass = learned.best;
             println!(
-                "{name}, {who}: {:.2} -> {:.2} nm, gauges {:.2} -> {:.2} +- {noise:.2} nm, {:?} after {} passes, kept {}; again {bare:.2} -> {kept:.2} nm",
-                first.translation_nm,
-                best.translation_nm,
-                first.measured_nm,
-                best.measured_nm,
-                learned.ending,
-                learned.passes.len() - 1,
-                learned.best
+                "{name}, {who}: {from:.2} -> {to:.2} nm, gauges {gauge_from:.2} -> {gauge_to:.2} +- {noise:.2} nm, {ending:?} after {passes} passes, kept {kept_pass}; again {bare:.2} -> {kept:.2} nm"
             );
             assert!(noise > 0.0 && noise < 0.1 * first.measured_nm, "{learned:?}");
             assert!(best.translation_nm <= first.translation_nm + noise && kept <= bare + noise, "{learned:?}");

@@ -12,7 +12,7 @@ use specgen::identify::{MAX_GRID, Options, error_on, join, write_leg_csv};
 use specgen::model::LegModelKind;
 use specgen_tests::{damped, leg_class, length, skipped};
 
-use super::bench::{Bench, VOLTAGE, in_parallel, three_records, two_rates};
+use super::bench::{Bench, VOLTAGE, faded, in_parallel, three_records, two_rates};
 
 /// One sine of an axis: axis, amplitude (m), angular frequency (rad/s), phase.
 type Line = (usize, f64, f64, f64);
@@ -56,20 +56,6 @@ impl Sines {
         });
         Self { lines: lines.collect() }
     }
-
-    /// Fade, and its first two derivatives by time.
-    fn fade(time: f64) -> [f64; 3] {
-        let (inward, sign) = if time > 0.5 * Self::DURATION { (Self::DURATION - time, -1.0) } else { (time, 1.0) };
-        if inward >= Self::FADE {
-            return [1.0, 0.0, 0.0];
-        }
-        let (u, per_second) = (inward.max(0.0) / Self::FADE, 1.0 / Self::FADE);
-        [
-            u.powi(3) * (10.0 - 15.0 * u + 6.0 * u * u),
-            sign * per_second * 30.0 * u * u * (1.0 - u) * (1.0 - u),
-            per_second * per_second * 60.0 * u * (1.0 - u) * (1.0 - 2.0 * u),
-        ]
-    }
 }
 
 impl PoseTrajectory for Sines {
@@ -78,7 +64,7 @@ impl PoseTrajectory for Sines {
     }
 
     fn target(&self, time: f64) -> PoseTarget {
-        let [fade, rate, bend] = Self::fade(time);
+        let [fade, rate, bend] = faded(time, Self::DURATION, Self::FADE);
         let mut target = PoseTarget::default();
         for (axis, a, angular, phase) in &self.lines {
             let (s, c) = (angular * time + phase).sin_cos();

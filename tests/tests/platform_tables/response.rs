@@ -102,15 +102,11 @@ fn a_machine_that_is_not_its_spec_learns_with_its_own_response() {
         let errors =
             |learned: &LearningResult| -> Vec<f64> { learned.passes.iter().map(|pass| pass.translation_nm).collect() };
         let [low, high] = convergence.band;
+        let (blind_nm, grew, radius, at) = (errors(blind), blind.grew(), convergence.radius, convergence.at);
+        let (own_nm, own_nrad) = (errors(own), own.passes[own.best].orientation_nrad);
         println!(
-            "{legs}, {what}: model, declared: f_c {limited:.0?} Hz; model, not declared: {:.1?} nm, grew {}; measured {low:.1} to {high:.0} Hz, radius \
-             {:.2} at {:.0} Hz: {:.1?} nm, {:.0} nrad",
-            errors(blind),
-            blind.grew(),
-            convergence.radius,
-            convergence.at,
-            errors(own),
-            own.passes[own.best].orientation_nrad,
+            "{legs}, {what}: model, declared: f_c {limited:.0?} Hz; model, not declared: {blind_nm:.1?} nm, grew {grew}; measured {low:.1} to {high:.0} Hz, radius \
+             {radius:.2} at {at:.0} Hz: {own_nm:.1?} nm, {own_nrad:.0} nrad"
         );
         for one in modes {
             println!("    {one:?}");

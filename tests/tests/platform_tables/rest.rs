@@ -54,12 +54,8 @@ fn the_pose_at_rest_is_as_noisy_as_the_compiler_states() {
         }
         for (axis, values) in axes.iter().enumerate() {
             let ratio = rms(values) / stated.pose[axis];
-            println!(
-                "{:.1} nm, {:.0} mV: axis {axis} {:.2} stated, × {ratio:.3}",
-                gauge * 1e9,
-                amplifier * 1e3,
-                stated.pose[axis] * 1e9
-            );
+            let (nm, mv, stated_nm) = (gauge * 1e9, amplifier * 1e3, stated.pose[axis] * 1e9);
+            println!("{nm:.1} nm, {mv:.0} mV: axis {axis} {stated_nm:.2} stated, × {ratio:.3}");
             all_hold &= bounds.contains(&ratio);
         }
     }

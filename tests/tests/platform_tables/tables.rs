@@ -169,14 +169,11 @@ fn table_9_on_random_machines() {
             let [p, both] = ["p", "pf-pcc"].map(|mode| table.row(part, mode).expect("the run was made"));
             let [nm, nrad] = table.ratio(part, "p", "pf-pcc").expect("the runs were made");
             let nominal = &machine.notched.specimen.nominal;
+            let (stiffness, damping) = (nominal.axial_stiffness_n_per_m, nominal.modal_damping);
+            let (p_nm, p_nrad, both_nm) = (p.translation_nm, p.orientation_nrad, both.translation_nm);
+            let both_nrad = both.orientation_nrad;
             println!(
-                "{part:<9} k_a {:.2e} ζ {:.3}: P {:.1} nm {:.0} nrad, P/F {:.2} nm {:.1} nrad, ratios {nm:.2} {nrad:.2}",
-                nominal.axial_stiffness_n_per_m,
-                nominal.modal_damping,
-                p.translation_nm,
-                p.orientation_nrad,
-                both.translation_nm,
-                both.orientation_nrad
+                "{part:<9} k_a {stiffness:.2e} ζ {damping:.3}: P {p_nm:.1} nm {p_nrad:.0} nrad, P/F {both_nm:.2} nm {both_nrad:.1} nrad, ratios {nm:.2} {nrad:.2}"
             );
             for (column, value) in columns.iter_mut().zip([nm, nrad, both.translation_nm, both.orientation_nrad]) {
                 column.push(value);

@@ -107,12 +107,10 @@ fn platform(random: &mut ChaCha8Rng, base: &Compilation) -> Vec<Part> {
     let [x, z] = [bound[0], bound[2] - 1e6 * task.setpoint.bias[2].abs()].map(|room| 0.3 * room);
     let [low, high] = base.model.sensor.range.map(|end| end * 1e6);
     let gauges = format!("calibration = [\"{:.4} um\", \"{:.6} um/V\"]", 0.5 * (low + high), (high - low) / 20.0);
+    let (start, step) = (-x, x / 4.0);
     let lines = [
         format!(
-            "kind = \"position\"\naxis = \"x\"\nstart = \"{:.3} um\"\nstop = \"{:.3} um\"\nstep = \"{:.3} um\"",
-            -x,
-            x,
-            x / 4.0
+            "kind = \"position\"\naxis = \"x\"\nstart = \"{start:.3} um\"\nstop = \"{x:.3} um\"\nstep = \"{step:.3} um\""
         ),
         format!("kind = \"level\"\naxis = \"z\"\nstart = \"0 um\"\nstop = \"{z:.3} um\""),
         format!("kind = \"points\"\nevery = {}", 1 + random.next_u64() % 9),
@@ -123,11 +121,9 @@ fn platform(random: &mut ChaCha8Rng, base: &Compilation) -> Vec<Part> {
     let count = 1 + first % 4;
     let lines: String =
         (0..count).map(|k| format!("\n[[trigger]]\nname = \"line-{k}\"\n{}\n", lines[(first / 4 + k) % 5])).collect();
+    let (to_x, to_z, ms) = (0.5 * x, -0.5 * z, 20.0 + 80.0 * unit(random));
     let step = format!(
-        "\n[[trajectory]]\nname = \"step\"\nkind = \"step\"\nto = [\"{:.3} um\", \"0 um\", \"{:.3} um\", \"0 urad\", \"0 urad\", \"0 urad\"]\ntime = \"{:.1} ms\"\n",
-        0.5 * x,
-        -0.5 * z,
-        20.0 + 80.0 * unit(random)
+        "\n[[trajectory]]\nname = \"step\"\nkind = \"step\"\nto = [\"{to_x:.3} um\", \"0 um\", \"{to_z:.3} um\", \"0 urad\", \"0 urad\", \"0 urad\"]\ntime = \"{ms:.1} ms\"\n"
     );
     let path = format!(
         "\n[[trajectory]]\nname = \"path\"\nkind = \"{}\"\nfrequency = \"1 Hz\"\n",

@@ -28,16 +28,13 @@ fn compare(name: &str, kind: Kind, more: &[(&str, &str)], mcu: Mcu, sequences: u
     let Some(image) = emitted.image(mcu) else { return };
     let result = assert_same_machine(name, &image, &config, &rows);
     let mean = |stage: &str| result.stats.stage(stage).map_or(0.0, |stage| stage.mean());
+    let (ticks, whole, law) = (rows.len(), mean("supervise"), mean("law"));
+    let (supervisor, other) = (mean("supervise") - mean("law"), mean("other phases"));
+    let most = result.stats.stages.iter().map(|stage| stage.largest).max().unwrap_or(0);
+    let stack = result.stats.painted_stack;
     println!(
-        "{name}: {sequences} sequences, {} ticks equal in every bit; {running} run: {:.0} instructions mean, {:.0} of them the law, \
-         {:.0} the supervisor; other phases {:.0} mean; most of any tick {}; stack {} bytes",
-        rows.len(),
-        mean("supervise"),
-        mean("law"),
-        mean("supervise") - mean("law"),
-        mean("other phases"),
-        result.stats.stages.iter().map(|stage| stage.largest).max().unwrap_or(0),
-        result.stats.painted_stack
+        "{name}: {sequences} sequences, {ticks} ticks equal in every bit; {running} run: {whole:.0} instructions mean, {law:.0} of them the law, \
+         {supervisor:.0} the supervisor; other phases {other:.0} mean; most of any tick {most}; stack {stack} bytes"
     );
 }
 
@@ -103,12 +100,10 @@ fn a_tick_in_which_nothing_is_wrong_costs_little_more_than_the_law() {
         let result = target::replay_machine(&image, bench.config(), &inputs, LIMIT).unwrap_or_else(|e| panic!("{e}"));
         let mean = |stage: &str| result.stats.stage(stage).map_or(0.0, |stage| stage.mean());
         let cost = mean("supervise") - mean("law");
+        let (whole, law, stack) = (mean("supervise"), mean("law"), result.stats.painted_stack);
+        let bytes = result.stats.state_bytes;
         println!(
-            "{kind:?}: {:.0} instructions mean, {:.0} of them the law, {cost:.0} the supervisor; stack {} bytes; Machine {} bytes",
-            mean("supervise"),
-            mean("law"),
-            result.stats.painted_stack,
-            result.stats.state_bytes
+            "{kind:?}: {whole:.0} instructions mean, {law:.0} of them the law, {cost:.0} the supervisor; stack {stack} bytes; Machine {bytes} bytes"
         );
         assert!(cost > 0.0 && cost < MOST_INSTRUCTIONS, "{kind:?}: {cost:.0} instructions");
     }

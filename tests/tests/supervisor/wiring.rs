@@ -432,12 +432,10 @@ fn a_check_has_the_same_bits_on_the_mcu() {
             assert!(host.rows.len() > 1000);
             let result = assert_same_machine(&format!("{name}, {fault}"), &image, &config, &host.rows);
             let stage = result.stats.stage("other phases").expect("no tick runs");
+            let (ticks, mean, most) = (host.rows.len(), stage.mean(), stage.largest);
+            let bytes = result.stats.state_bytes;
             println!(
-                "{name}, {fault}: {} ticks equal in every bit; instructions {:.0} mean, {} at most; Machine {} bytes",
-                host.rows.len(),
-                stage.mean(),
-                stage.largest,
-                result.stats.state_bytes
+                "{name}, {fault}: {ticks} ticks equal in every bit; instructions {mean:.0} mean, {most} at most; Machine {bytes} bytes"
             );
         }
     }

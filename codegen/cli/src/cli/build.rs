@@ -41,15 +41,10 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
         // clap requires it unless there is a subcommand.
         return Err(Failure::Usage("name a spec file".to_owned()));
     };
-    let options = Options {
-        spec: spec.to_owned(),
-        output: arguments.output.as_deref().map(Into::into),
-        no_build: arguments.no_build,
-        board: arguments.board,
-        setup: arguments.setup,
-        details: arguments.details,
-        require_target: arguments.require_target,
+    let options = options!(arguments => Options {
+        no_build board setup details require_target;
+        spec: spec.to_owned(), output: arguments.output.as_deref().map(Into::into),
         deny_warnings: arguments.strictness.deny_warnings,
-    };
+    });
     build::run(&options, ui)
 }

@@ -39,12 +39,12 @@ impl Outcome for CacheSize {
             (Some(folder), Some(bytes)) => {
                 format!("removed {}, {} bytes, from {folder}\n", builds(self.removed), group(bytes))
             }
-            (Some(folder), None) => format!(
-                "{folder}: {}, {} of at most {} bytes; least recently used builds are removed first\n",
-                builds(self.builds),
-                group(self.bytes),
-                group(self.limit)
-            ),
+            (Some(folder), None) => {
+                let (kept, size, limit) = (builds(self.builds), group(self.bytes), group(self.limit));
+                format!(
+                    "{folder}: {kept}, {size} of at most {limit} bytes; least recently used builds are removed first\n"
+                )
+            }
         }
     }
 }

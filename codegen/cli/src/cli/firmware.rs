@@ -37,15 +37,11 @@ struct Common {
 
 impl Common {
     fn options(&self) -> Options {
-        Options {
-            target: self.target.clone(),
-            output: self.output.as_deref().map(Into::into),
-            target_dir: self.target_dir.as_deref().map(Into::into),
-            lockstep: self.lockstep,
-            no_measure: self.no_measure,
-            assumed_ok: self.assumed_ok,
+        options!(self => Options {
+            target lockstep no_measure assumed_ok;
+            output: self.output.as_deref().map(Into::into), target_dir: self.target_dir.as_deref().map(Into::into),
             deny_warnings: self.strictness.deny_warnings,
-        }
+        })
     }
 }
 

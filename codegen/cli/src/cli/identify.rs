@@ -78,8 +78,8 @@ struct EverettArguments {
     /// simplest whose error on it is within a tenth of the least.
     #[arg(long, value_name = "RECORD")]
     validate: Option<InputFile>,
-    /// Write the table to this file (CSV: up_V, down_V, everett_um). With --spec: the folder for six tables, leg1.csv
-    /// (leg 0) to leg6.csv (leg 5), relative to that of the spec.
+    /// Write the table to this file (CSV: up_V, down_V, everett_um). With --spec: the folder for six tables, leg0.csv to
+    /// leg5.csv, within that of the spec.
     #[arg(short, long, value_name = "FILE|DIR")]
     output: Option<OutputFileOrFolder>,
     #[command(flatten)]
@@ -129,9 +129,9 @@ struct GainsArguments {
     /// The spec that the target was built from.
     #[arg(long, value_name = "SPEC")]
     spec: InputFile,
-    /// Folder for the six tables, leg1.csv to leg6.csv, relative to that of the spec.
+    /// Folder for the six tables, leg0.csv to leg5.csv, within that of the spec.
     #[arg(short, long, value_name = "DIR")]
-    output: Option<String>,
+    output: Option<OutputFolder>,
 }
 
 /// Arguments of `identify gauge`.

@@ -82,21 +82,12 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
                     of its spec";
         return Err(Failure::Usage(text.to_owned()));
     }
-    let options = Options {
-        trajectory: arguments.trajectory.clone(),
-        frequency: arguments.frequency,
-        passes: arguments.passes,
-        bandwidth: arguments.bandwidth,
-        vary: arguments.vary.clone(),
-        prepare: arguments.prepare,
-        from: arguments.from.as_deref().map(Into::into),
-        excite: arguments.excite.as_deref().map(Into::into),
-        response: arguments.response.as_deref().map(Into::into),
-        on_device: arguments.on_device,
-        output: arguments.output.as_deref().map(Into::into),
-        machine: arguments.machine.clone(),
+    let options = options!(arguments => Options {
+        trajectory frequency passes bandwidth vary prepare on_device machine;
+        from: arguments.from.as_deref().map(Into::into), excite: arguments.excite.as_deref().map(Into::into),
+        response: arguments.response.as_deref().map(Into::into), output: arguments.output.as_deref().map(Into::into),
         plant: arguments.plant.options(),
-    };
+    });
     options.check()?;
     let spec: &Path = &arguments.spec;
     if !named {

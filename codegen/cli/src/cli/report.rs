@@ -31,13 +31,10 @@ pub struct Arguments {
 }
 
 pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
-    let options = Options {
-        spec: arguments.spec.to_path_buf(),
-        output: arguments.output.as_deref().map(Into::into),
-        paper: arguments.paper,
-        generations: arguments.generations,
+    let options = options!(arguments => Options {
+        paper generations no_target;
+        spec: arguments.spec.to_path_buf(), output: arguments.output.as_deref().map(Into::into),
         record: arguments.record.as_deref().map(Into::into),
-        no_target: arguments.no_target,
-    };
+    });
     pages::run(&options, ui)
 }

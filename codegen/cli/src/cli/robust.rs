@@ -134,24 +134,11 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     let Some(spec) = arguments.spec.as_deref() else {
         return Err(Failure::Usage("expected a spec file, or merge".to_owned()));
     };
-    let options = Options {
-        spec: spec.to_owned(),
-        draws: arguments.draws,
-        vary: arguments.vary.clone(),
-        trajectory: arguments.trajectory.clone(),
-        frequency: arguments.frequency,
-        replay: arguments.replay.clone(),
-        max_error: arguments.max_error,
-        max_orientation: arguments.max_orientation,
-        learn: arguments.learn,
-        max_learned: arguments.max_learned,
-        quantile: arguments.quantile,
-        diverged_above: arguments.diverged_above,
-        threads: arguments.threads,
-        shard: arguments.shard,
-        output: arguments.output.as_deref().map(Into::into),
-        plot: arguments.plot.place(),
+    let options = options!(arguments => Options {
+        draws vary trajectory frequency replay max_error max_orientation learn max_learned quantile diverged_above
+        threads shard;
+        spec: spec.to_owned(), output: arguments.output.as_deref().map(Into::into), plot: arguments.plot.place(),
         plant: arguments.plant.options(),
-    };
+    });
     robust::run(&options, ui)
 }

@@ -97,21 +97,10 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     // Refuse a bad leg file before the long part of the work.
     plant.leg()?;
     let compiled = spec_file::compiled(&arguments.spec, ui)?;
-    let options = Options {
-        output: arguments.output.as_deref().map(Into::into),
-        traces: arguments.traces,
-        plot: arguments.plot.place(),
-        paper: arguments.paper,
-        plant,
-        samples: arguments.samples,
-        frequency: arguments.frequency.clone(),
-        trajectory: arguments.trajectory.clone(),
-        latency: arguments.latency,
-        small_steps: arguments.small_steps,
-        record: arguments.record.as_deref().map(Into::into),
-        emitted: arguments.emitted,
-        seconds: arguments.seconds,
-        amplitude: arguments.amplitude * 1e-2,
-    };
+    let options = options!(arguments => Options {
+        traces paper samples frequency trajectory latency small_steps emitted seconds;
+        output: arguments.output.as_deref().map(Into::into), plot: arguments.plot.place(), plant: plant,
+        record: arguments.record.as_deref().map(Into::into), amplitude: arguments.amplitude * 1e-2,
+    });
     report::run(&options, &compiled, ui)
 }

@@ -120,30 +120,17 @@ fn name(value: impl ValueEnum) -> String {
 }
 
 pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
-    let options = Options {
-        spec: arguments.spec.to_path_buf(),
+    let options = options!(arguments => Options {
+        compare evaluations population frequency seconds gain_margin delay_margin bounds latency threads write;
+        spec: arguments.spec.to_path_buf(), genetic: arguments.optimiser == OptimiserArgument::Genetic,
+        trajectory: name(arguments.trajectory), evaluate: arguments.evaluate.as_deref().map(Into::into),
+        output: arguments.output.as_deref().map(Into::into), plot: arguments.plot.place(),
+        plant: arguments.plant.options(),
         what: match arguments.what {
             WhatArgument::Gains => TunedNumbers::Gains,
             WhatArgument::Weights => TunedNumbers::Weights,
             WhatArgument::All => TunedNumbers::All,
         },
-        genetic: arguments.optimiser == OptimiserArgument::Genetic,
-        compare: arguments.compare,
-        evaluations: arguments.evaluations,
-        population: arguments.population,
-        trajectory: name(arguments.trajectory),
-        frequency: arguments.frequency,
-        seconds: arguments.seconds,
-        gain_margin: arguments.gain_margin,
-        delay_margin: arguments.delay_margin,
-        bounds: arguments.bounds.clone(),
-        latency: arguments.latency,
-        threads: arguments.threads,
-        evaluate: arguments.evaluate.as_deref().map(Into::into),
-        output: arguments.output.as_deref().map(Into::into),
-        write: arguments.write,
-        plot: arguments.plot.place(),
-        plant: arguments.plant.options(),
-    };
+    });
     tune::run(&options, ui)
 }

@@ -64,12 +64,8 @@ pub fn a_heartbeat_ends_with_the_process(bench: &Bench) {
     let mut gaps: Vec<u64> = beats.windows(2).map(|pair| pair[1][0] - pair[0][0]).collect();
     gaps.sort_unstable();
     let median = gaps[gaps.len() / 2];
-    println!(
-        "heartbeat: {} edges in {:.3} s, {:.1} us apart (median)",
-        beats.len(),
-        span as f64 * 1e-9,
-        median as f64 * 1e-3
-    );
+    let (edges, seconds, apart) = (beats.len(), span as f64 * 1e-9, median as f64 * 1e-3);
+    println!("heartbeat: {edges} edges in {seconds:.3} s, {apart:.1} us apart (median)");
     assert!(median < 2 * PERIOD, "{median}");
     std::thread::sleep(Duration::from_millis(50));
     assert!(beats[beats.len() - 1][0] <= dead + 2 * PERIOD && length() / 16 == beats.len() as u64);

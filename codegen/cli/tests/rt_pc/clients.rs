@@ -4,9 +4,7 @@ use std::io::Write;
 use std::os::unix::net::UnixStream;
 use std::path::PathBuf;
 use std::process::{Command, Stdio};
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use rustix::process::Signal;
@@ -18,37 +16,18 @@ use super::{
     ACKNOWLEDGE, ARM, Bench, FAULTED, HOLD, HOLDING, HOST_GONE, LINK_LOST, NONE, ProcessGuard, RAMP_DOWN, RUN, RUNNING,
     signal, wait_for,
 };
-use crate::support::length;
+use crate::support::{Background, length};
 
 /// Time within which `ramp-down` takes effect.
 const TAKEN: Duration = Duration::from_secs(1);
 
 /// A host in control that is never silent, until it is dropped or its connection is closed.
-struct ControllingHost {
-    over: Arc<AtomicBool>,
-    thread: Option<JoinHandle<()>>,
-}
-
-impl ControllingHost {
-    fn new(mut host: Host) -> Self {
-        let over = Arc::new(AtomicBool::new(false));
-        let ended = Arc::clone(&over);
-        let thread = std::thread::spawn(move || {
-            while !ended.load(Ordering::Relaxed) && host.is_answered() {
-                std::thread::sleep(Duration::from_millis(5));
-            }
-        });
-        Self { over, thread: Some(thread) }
-    }
-}
-
-impl Drop for ControllingHost {
-    fn drop(&mut self) {
-        self.over.store(true, Ordering::Relaxed);
-        if let Some(thread) = self.thread.take() {
-            let _ = thread.join();
+fn controlling(mut host: Host) -> Background {
+    Background::new(move |over| {
+        while !over.load(Ordering::Relaxed) && host.is_answered() {
+            std::thread::sleep(Duration::from_millis(5));
         }
-    }
+    })
 }
 
 struct Site {
@@ -104,7 +83,7 @@ pub fn nobody_keeps_others_from_ramping_down(bench: &Bench) {
     if length(false, true) {
         one_that_only_looks_loses_them(&site);
         let idle: Vec<UnixStream> = (0..8).map(|_| UnixStream::connect(&site.link).unwrap()).collect();
-        let kept = ControllingHost::new(site.run());
+        let kept = controlling(site.run());
         site.down("eight idle hosts, and one that has the orders");
         drop((idle, kept));
         under_a_flood(&site);
@@ -163,7 +142,7 @@ fn one_that_never_returns_is_not_waited_for(site: &Site) {
 
 /// `operate stop` takes effect while another host is in control, and returns when the program has ended.
 fn client_without_control_stops_the_program(site: &Site, running: ProcessGuard) {
-    let kept = ControllingHost::new(site.run());
+    let kept = controlling(site.run());
     let stopped = site.operate(&["shutdown"]).status().unwrap();
     assert!(stopped.success() && !site.link.exists(), "{stopped}");
     let output = running.wait();
@@ -202,7 +181,7 @@ fn under_a_flood(site: &Site) {
     std::thread::scope(|scope| {
         scope.spawn(flood);
         scope.spawn(asking);
-        let kept = ControllingHost::new(site.run());
+        let kept = controlling(site.run());
         site.down("a flood of noise and requests");
         drop(kept);
         over.store(true, Ordering::Relaxed);

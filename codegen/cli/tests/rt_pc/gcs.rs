@@ -4,7 +4,7 @@
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
 use std::path::Path;
-use std::process::{Child, Command, Stdio};
+use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
 use rustix::process::Signal;
@@ -13,7 +13,7 @@ use specgen_link::Request;
 use specgen_link::client::Timeout;
 
 use super::host::Host;
-use super::{Bench, DISARMED, HOLDING, NONE, ProcessGuard, RUNNING, signal, wait_for};
+use super::{Bench, DISARMED, HOLDING, NONE, ProcessGuard, RUNNING, wait_for};
 use crate::support::length;
 
 /// Largest distance from the target after arrival, µm: much more than the gauges' noise, much less than a move.
@@ -21,7 +21,7 @@ const THERE: f64 = 0.05;
 
 /// The bridge, at a separate port.
 pub struct Bridge {
-    process: Option<Child>,
+    process: ProcessGuard,
     port: u16,
 }
 
@@ -41,7 +41,7 @@ impl Bridge {
         });
         // Discard its later output, so that it does not block.
         std::thread::spawn(move || said.for_each(drop));
-        Self { process: Some(process), port: port.unwrap() }
+        Self { process: ProcessGuard(Some(process)), port: port.unwrap() }
     }
 
     pub fn client(&self) -> Client {
@@ -52,19 +52,8 @@ impl Bridge {
     }
 
     /// Ends it like Ctrl-C.
-    pub fn end(mut self) {
-        let mut process = self.process.take().unwrap();
-        signal(&process, Signal::INT);
-        assert_eq!(process.wait().unwrap().code(), Some(0));
-    }
-}
-
-impl Drop for Bridge {
-    fn drop(&mut self) {
-        if let Some(process) = &mut self.process {
-            let _ = process.kill();
-            let _ = process.wait();
-        }
+    pub fn end(self) {
+        assert_eq!(self.process.end(Signal::INT).status.code(), Some(0));
     }
 }
 
@@ -308,12 +297,8 @@ fn latency(client: &mut Client, read_place: &mut impl FnMut() -> MeasuredPose) {
         })
         .collect();
     times.sort_by(f64::total_cmp);
-    println!(
-        "gcs: MOV to the first tick that follows: {:.2} ms (median), {:.2} ms (longest of {})",
-        times[times.len() / 2],
-        times[times.len() - 1],
-        times.len()
-    );
+    let (median, longest, all) = (times[times.len() / 2], times[times.len() - 1], times.len());
+    println!("gcs: MOV to the first tick that follows: {median:.2} ms (median), {longest:.2} ms (longest of {all})");
 }
 
 /// The exact bytes that Micro-Manager's `PI_GCS_2` and EPICS' `motorPIGCS2` sent in a trial.

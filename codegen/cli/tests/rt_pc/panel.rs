@@ -6,10 +6,9 @@ use std::io::{BufRead, BufReader, Write};
 use std::net::{Shutdown, TcpStream};
 use std::os::unix::net::{UnixListener, UnixStream};
 use std::path::Path;
-use std::process::{Child, Command, Stdio};
+use std::process::{Command, Stdio};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
-use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use rustix::process::Signal;
@@ -21,7 +20,8 @@ use tungstenite::client::IntoClientRequest;
 use tungstenite::{Message, WebSocket};
 
 use super::host::Host;
-use super::{Bench, FAULTED, HOLDING, LINK_LOST, ProcessGuard, RAMP_DOWN, Record, signal, wait_for};
+use super::{Bench, FAULTED, HOLDING, LINK_LOST, ProcessGuard, RAMP_DOWN, Record, wait_for};
+use crate::support::Background;
 
 mod browser;
 
@@ -30,7 +30,7 @@ const LONG: Duration = Duration::from_secs(60);
 
 /// The panel, at a separate port.
 pub struct Panel {
-    process: Option<Child>,
+    process: ProcessGuard,
     pub address: String,
     pub token: String,
 }
@@ -47,7 +47,7 @@ impl Panel {
         std::thread::spawn(move || said.map_while(Result::ok).for_each(|line| println!("panel: {line}")));
         let printed = printed.expect("it says where it is");
         let (address, token) = printed.split_once("/?token=").unwrap();
-        Self { process: Some(process), address: address.to_owned(), token: token.to_owned() }
+        Self { process: ProcessGuard(Some(process)), address: address.to_owned(), token: token.to_owned() }
     }
 
     fn url(&self) -> String {
@@ -72,19 +72,8 @@ impl Panel {
     }
 
     /// Ends it like Ctrl-C.
-    pub fn end(mut self) {
-        let mut process = self.process.take().unwrap();
-        signal(&process, Signal::INT);
-        assert_eq!(process.wait().unwrap().code(), Some(0));
-    }
-}
-
-impl Drop for Panel {
-    fn drop(&mut self) {
-        if let Some(process) = &mut self.process {
-            let _ = process.kill();
-            let _ = process.wait();
-        }
+    pub fn end(self) {
+        assert_eq!(self.process.end(Signal::INT).status.code(), Some(0));
     }
 }
 
@@ -485,43 +474,24 @@ fn garbage_disturbs_nothing(panel: &Panel, page: &mut Page) {
 }
 
 /// A machine with the plant of another spec, as if cables were swapped.
-struct MiswiredMachine {
-    stop: Arc<AtomicBool>,
-    thread: Option<JoinHandle<()>>,
-}
-
-impl MiswiredMachine {
-    fn new(spec: &Path, digest: &str, name: &str) -> Self {
-        let compiled = compile::compile(spec).unwrap_or_else(|_| panic!("it compiles"));
-        let task = compiled.model.task_space.as_ref().unwrap();
-        let leg = host_sim::plant::LegParameters::reference();
-        let specimen = machine::specimen(&compiled.model, task, &leg, Some(1));
-        let noise = host_sim::platform::rig::Noise::of(&specimen);
-        let scenario = machine::scenario(&compiled.model, task, &specimen, &noise, 1);
-        let plant = host_sim::machine::Machine::Platform(Box::new(scenario.rig().clone()));
-        let mut plant_server = plant_server::PlantServer::new(plant, &compiled.model, &compiled.ir);
-        let server = Server::create(&path_of(name).unwrap(), digest).unwrap();
-        let stop = Arc::new(AtomicBool::new(false));
-        let ends = stop.clone();
-        let thread = std::thread::spawn(move || {
-            let mut seen = 0;
-            while !ends.load(Ordering::Relaxed) {
-                if let Some((actuation, wanted)) = server.wait(&mut seen, 0, 50_000_000) {
-                    server.publish(&plant_server.answer(&actuation, wanted));
-                }
+fn miswired_machine(spec: &Path, digest: &str, name: &str) -> Background {
+    let compiled = compile::compile(spec).unwrap_or_else(|_| panic!("it compiles"));
+    let task = compiled.model.task_space.as_ref().unwrap();
+    let leg = host_sim::plant::LegParameters::reference();
+    let specimen = machine::specimen(&compiled.model, task, &leg, Some(1));
+    let noise = host_sim::platform::rig::Noise::of(&specimen);
+    let scenario = machine::scenario(&compiled.model, task, &specimen, &noise, 1);
+    let plant = host_sim::machine::Machine::Platform(Box::new(scenario.rig().clone()));
+    let mut plant_server = plant_server::PlantServer::new(plant, &compiled.model, &compiled.ir);
+    let server = Server::create(&path_of(name).unwrap(), digest).unwrap();
+    Background::new(move |over| {
+        let mut seen = 0;
+        while !over.load(Ordering::Relaxed) {
+            if let Some((actuation, wanted)) = server.wait(&mut seen, 0, 50_000_000) {
+                server.publish(&plant_server.answer(&actuation, wanted));
             }
-        });
-        Self { stop, thread: Some(thread) }
-    }
-}
-
-impl Drop for MiswiredMachine {
-    fn drop(&mut self) {
-        self.stop.store(true, Ordering::Relaxed);
-        if let Some(thread) = self.thread.take() {
-            let _ = thread.join();
         }
-    }
+    })
 }
 
 #[test]
@@ -549,7 +519,7 @@ fn the_wiring_check_names_gauges_that_are_exchanged_or_turned_and_lets_a_good_ma
         let path = bench.path(&format!("check-{number}.toml"));
         fs::write(&path, spec).unwrap();
         let name = format!("check-{number}-{}", std::process::id());
-        let plant = MiswiredMachine::new(&path, &digest, &name);
+        let plant = miswired_machine(&path, &digest, &name);
         let link = bench.path(&format!("check{number}.link"));
         let running = program(&bench, &format!("check{number}.rec"), &name, &link);
         let panel = Panel::new(&bench.spec, &link);

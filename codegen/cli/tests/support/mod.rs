@@ -1,5 +1,8 @@
 //! Runs the real binary on a copy of the specs, and checks its output.
 
+#[expect(dead_code, reason = "the cases are only read here")]
+#[path = "../../../../tests/src/cases.rs"]
+pub mod cases;
 pub mod commands;
 pub mod unprivileged;
 
@@ -11,6 +14,9 @@ use std::fs;
 use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::JoinHandle;
 
 use serde_json::Value;
 use specgen::findings;
@@ -237,6 +243,29 @@ pub fn contents(root: &Path) -> BTreeMap<String, Vec<u8>> {
 #[track_caller]
 pub fn send(signal: Signal, process: u32) {
     kill_process(Pid::from_raw(process.cast_signed()).unwrap(), signal).unwrap();
+}
+
+/// A thread that goes on until it is dropped.
+pub struct Background {
+    over: Arc<AtomicBool>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Background {
+    /// `work` returns soon after its argument is set.
+    pub fn new(work: impl FnOnce(&AtomicBool) + Send + 'static) -> Self {
+        let over = Arc::new(AtomicBool::new(false));
+        let ends = Arc::clone(&over);
+        Self { over, thread: Some(std::thread::spawn(move || work(&ends))) }
+    }
+}
+
+impl Drop for Background {
+    fn drop(&mut self) {
+        self.over.store(true, Ordering::Relaxed);
+        let ended = self.thread.take().unwrap().join();
+        assert!(ended.is_ok() || std::thread::panicking());
+    }
 }
 
 /// Selects the short value, or the long one in the full run.

@@ -215,16 +215,12 @@ fn strain(facts: &Facts, found: &mut Findings) {
     if off <= 1.0 {
         return;
     }
+    let [travel, share, length] = [stroke * 1e6, stroke / length, length * 1e3].map(figure);
     found.add_off(
         off,
         STRAIN_ODD,
         "actuator.stroke",
-        format!(
-            "a stroke of {} um is {} of a leg of {} mm",
-            figure(stroke * 1e6),
-            figure(stroke / length),
-            figure(length * 1e3)
-        ),
+        format!("a stroke of {travel} um is {share} of a leg of {length} mm"),
         "stacks give 0.001 to 0.0015 of their own length: check the units of `actuator.stroke` and of [geometry]",
     );
 }
@@ -243,12 +239,10 @@ fn stiffness_fits_resonance(facts: &Facts, found: &mut Findings) {
     // If only one of the two is in the usual range, the other is suspected.
     let leg_like = (STIFFNESSES.contains(&model.actuator.axial_stiffness), RESONANCES.contains(&resonance));
     let key = if leg_like == (false, true) { "actuator.axial_stiffness" } else { "actuator.resonance" };
+    let [stiffness, alone, own_mass] = [model.actuator.axial_stiffness, bare, own * 1e3].map(figure);
+    let with_platform = figure(loaded);
     let sizes = format!(
-        "a leg of {} N/m resonates at {} Hz with only its extensible part of {} g, and at {} Hz with a sixth of the platform added",
-        figure(model.actuator.axial_stiffness),
-        figure(bare),
-        figure(own * 1e3),
-        figure(loaded)
+        "a leg of {stiffness} N/m resonates at {alone} Hz with only its extensible part of {own_mass} g, and at {with_platform} Hz with a sixth of the platform added"
     );
     found.add_off(
         off,
@@ -267,16 +261,14 @@ fn slew_spares_the_stacks(facts: &Facts, found: &mut Findings) {
     if time * actuator.resonance >= FASTEST {
         return;
     }
+    let [slew, volts, crossing] = [actuator.slew_rate * 1e-3, high - low, time * 1e6].map(figure);
+    let resonance = figure(1e6 / actuator.resonance);
     found.add_off(
         FASTEST / (time * actuator.resonance),
         SLEW_TOO_FAST,
         "actuator.slew_rate",
         format!(
-            "at {} V/ms a stack crosses its range of {} V in {} us; one period of its resonance is {} us",
-            figure(actuator.slew_rate * 1e-3),
-            figure(high - low),
-            figure(time * 1e6),
-            figure(1e6 / actuator.resonance)
+            "at {slew} V/ms a stack crosses its range of {volts} V in {crossing} us; one period of its resonance is {resonance} us"
         ),
         &format!(
             "a stack that crosses its range in less than a third of a period overshoots into tension: at most \"{} V/ms\" is usual; check the unit (V/ms or V/s)",
@@ -293,16 +285,13 @@ fn slew_moves_the_legs(facts: &Facts, found: &mut Findings) {
     if time <= SLOWEST {
         return;
     }
+    let [slew, seconds] = [actuator.slew_rate * 1e-3, time].map(figure);
+    let speed = figure(actuator.slew_rate * actuator.leg_gain() * 1e6);
     found.add_off(
         time / SLOWEST,
         SLEW_TOO_SLOW,
         "actuator.slew_rate",
-        format!(
-            "at {} V/ms a leg takes {} s for its stroke: it moves at {} um/s at most",
-            figure(actuator.slew_rate * 1e-3),
-            figure(time),
-            figure(actuator.slew_rate * actuator.leg_gain() * 1e6)
-        ),
+        format!("at {slew} V/ms a leg takes {seconds} s for its stroke: it moves at {speed} um/s at most"),
         "check the unit: V/ms or V/s",
     );
 }

@@ -191,16 +191,13 @@ fn calibrations_fit_converter(facts: &Facts, found: &mut Findings) {
         if off <= 1.0 || keys.contains(&key) {
             continue;
         }
+        let [slope, span, volts, range] = [powers[1] * 1e6, read * 1e6, to - from, (high - low) * 1e6].map(figure);
         found.add_off(
             off,
             CALIBRATION_ODD,
             &format!("{key}[1]"),
             format!(
-                "at {} um/V the gauge reads {} um over the {} V of its converter, but `sensor.range` is {} um",
-                figure(powers[1] * 1e6),
-                figure(read * 1e6),
-                figure(to - from),
-                figure((high - low) * 1e6)
+                "at {slope} um/V the gauge reads {span} um over the {volts} V of its converter, but `sensor.range` is {range} um"
             ),
             &format!("check the unit of this coefficient of `{key}`, `sensor.range` and `sensor.input_range`"),
         );
@@ -259,14 +256,12 @@ fn calibrations_straight(facts: &Facts, found: &mut Findings) {
             }
             let own = format!("gauge[{gauge}].calibration");
             let key = if found.model.spans.contains_key(&own) { own } else { "sensor.calibration".to_owned() };
+            let [adds, at, range] = [added * 1e6, farthest, (high - low) * 1e6].map(figure);
             found.add(
                 CALIBRATION_BENT,
                 &format!("{key}[{power}]"),
                 format!(
-                    "power {power} of the calibration of gauge {gauge} adds {} um at {} V, on a range of {} um",
-                    figure(added * 1e6),
-                    figure(farthest),
-                    figure((high - low) * 1e6)
+                    "power {power} of the calibration of gauge {gauge} adds {adds} um at {at} V, on a range of {range} um"
                 ),
                                 "gauges are linear within 1 or 2 % of their range: check the unit of this coefficient (nm/V^2 or um/V^2) and of the slope before it",
             );
@@ -297,16 +292,14 @@ fn gains_by_stiffness(facts: &Facts, found: &mut Findings) {
             if ratio == 0.0 || usual == 0.0 || (1.0 / GAIN_SPREAD..=GAIN_SPREAD).contains(&(ratio / usual)) {
                 continue;
             }
+            let (name, gain, times) = (AXES[axis], figure(values[axis]), figure(ratio / usual));
+            let of_axis = figure(stiffness[axis]);
             found.add_off(
                 times_beyond(ratio / usual, &(1.0 / GAIN_SPREAD..=GAIN_SPREAD)),
                 GAIN_UNEVEN,
                 &format!("{key}[{axis}]"),
                 format!(
-                    "the gain of {} is {}: relative to the stiffness of its axis, that is {} times the gains of the other axes (stiffness {})",
-                    AXES[axis],
-                    figure(values[axis]),
-                    figure(ratio / usual),
-                    figure(stiffness[axis])
+                    "the gain of {name} is {gain}: relative to the stiffness of its axis, that is {times} times the gains of the other axes (stiffness {of_axis})"
                 ),
                 &format!("about {:.3e} would match the others: check the unit", usual * stiffness[axis]),
             );
@@ -323,13 +316,12 @@ fn integral_in_time(facts: &Facts, found: &mut Findings) {
         if rate == 0.0 || rate >= SLOWEST {
             continue;
         }
+        let [per_second, seconds] = [rate, 1.0 / rate].map(figure);
         found.add(
             INTEGRAL_SLOW,
             &key,
             format!(
-                "the integral gains over the stiffness of their axes are about {} 1/s: a time constant of {} s",
-                figure(rate),
-                figure(1.0 / rate)
+                "the integral gains over the stiffness of their axes are about {per_second} 1/s: a time constant of {seconds} s"
             ),
             "tens to hundreds of 1/s are usual: check the unit (N/(m s), N m/(rad s)), or leave the gains out: the compiler derives them",
         );
@@ -351,16 +343,13 @@ fn gains_in_order(facts: &Facts, found: &mut Findings) {
             if now <= libm::log(EXCHANGED_NOW) || exchanged >= libm::log(EXCHANGED_THEN) {
                 continue;
             }
+            let (first, second, gain, other) = (AXES[a], AXES[b], figure(values[a]), figure(values[b]));
+            let times = figure(stiffness[a] / stiffness[b]);
             found.add(
                 GAINS_EXCHANGED,
                 &format!("{key}[{a}]"),
                 format!(
-                    "the gains of {} and {} are {} and {}, but the platform is {} times as stiff along the first as along the second",
-                    AXES[a],
-                    AXES[b],
-                    figure(values[a]),
-                    figure(values[b]),
-                    figure(stiffness[a] / stiffness[b])
+                    "the gains of {first} and {second} are {gain} and {other}, but the platform is {times} times as stiff along the first as along the second"
                 ),
                 &format!("if they were swapped they would match the stiffness: check the order of `{key}`"),
             );

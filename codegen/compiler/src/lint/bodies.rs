@@ -280,16 +280,13 @@ fn leg_parts_have_size(facts: &Facts, found: &mut Findings) {
         if radius >= THINNEST * length {
             continue;
         }
+        let [gyration, grams, moment, long] = [radius * 1e3, mass * 1e3, inertia * 1e9, length * 1e3].map(figure);
         found.add_off(
             THINNEST * length / radius,
             LEG_PART_SMALL,
             &format!("leg.{part}_inertia"),
             format!(
-                "the {part} part of a leg has a radius of gyration of {} mm (from {} g and {} g mm^2), in a leg of {} mm",
-                figure(radius * 1e3),
-                figure(mass * 1e3),
-                figure(inertia * 1e9),
-                figure(length * 1e3)
+                "the {part} part of a leg has a radius of gyration of {gyration} mm (from {grams} g and {moment} g mm^2), in a leg of {long} mm"
             ),
             &format!("check the units of `leg.{part}_inertia` and `leg.{part}_mass`"),
         );
@@ -304,14 +301,13 @@ fn mass_centres_off_the_joints(facts: &Facts, found: &mut Findings) {
         if *center == 0.0 || *center >= NEAREST_CENTRE * radius {
             continue;
         }
+        let [distance, gyration] = [center * 1e3, radius * 1e3].map(figure);
         found.add_off(
             NEAREST_CENTRE * radius / center,
             CENTRE_AT_JOINT,
             &format!("leg.{part}_center"),
             format!(
-                                "the mass centre of the {part} part is {} mm from its joint, but the part's radius of gyration is {} mm",
-                figure(center * 1e3),
-                figure(radius * 1e3)
+                                "the mass centre of the {part} part is {distance} mm from its joint, but the part's radius of gyration is {gyration} mm"
             ),
             "check the unit: mm or um",
         );
@@ -328,16 +324,13 @@ fn parts_are_bodies(facts: &Facts, found: &mut Findings) {
         if *center == 0.0 || SOUND_PART.contains(&(radius / center)) || found.list.iter().any(is_known) {
             continue;
         }
+        let [gyration, grams, moment, distance] = [radius * 1e3, mass * 1e3, inertia * 1e9, center * 1e3].map(figure);
         found.add_off(
             times_beyond(radius / center, &SOUND_PART),
             LEG_PART_SHAPE,
             &key,
             format!(
-                "the {part} part of a leg has a radius of gyration of {} mm (from {} g and {} g mm^2) about a mass centre {} mm from its joint",
-                figure(radius * 1e3),
-                figure(mass * 1e3),
-                figure(inertia * 1e9),
-                figure(center * 1e3)
+                "the {part} part of a leg has a radius of gyration of {gyration} mm (from {grams} g and {moment} g mm^2) about a mass centre {distance} mm from its joint"
             ),
             &format!(
                 "a rod that starts at the joint would have {} mm: check `leg.{part}_inertia` (about the mass centre), `leg.{part}_mass` and `leg.{part}_center`",
@@ -354,15 +347,13 @@ fn centre_over_joints(facts: &Facts, found: &mut Findings) {
         if libm::fabs(value) <= FARTHEST_CENTRE[axis] * size {
             continue;
         }
+        let (distance, along, joints) = (figure(value * 1e3), ["x", "y", "z"][axis], figure(size * 1e3));
         found.add_off(
             libm::fabs(value) / (FARTHEST_CENTRE[axis] * size),
             CENTRE_FAR,
             &format!("platform.center_of_mass[{axis}]"),
             format!(
-                "the centre of mass is {} mm from P_C along {}, but the platform's joints are only {} mm from its axis",
-                figure(value * 1e3),
-                ["x", "y", "z"][axis],
-                figure(size * 1e3)
+                "the centre of mass is {distance} mm from P_C along {along}, but the platform's joints are only {joints} mm from its axis"
             ),
             "the load would be outside the legs: check the unit of `platform.center_of_mass` and the order of its axes",
         );
@@ -378,17 +369,14 @@ fn moments_of_each_axis(facts: &Facts, found: &mut Findings) {
         if sound.contains(&(radius / size)) {
             continue;
         }
+        let (name, gyration, moment) = (["x", "y", "z"][axis], figure(radius * 1e3), figure(moment * 1e9));
+        let [kilograms, joints] = [body.mass, size * 1e3].map(figure);
         found.add_off(
             times_beyond(radius / size, &sound),
             MOMENT_ODD,
             &format!("platform.inertia[{axis}]"),
             format!(
-                "about {} the platform has a radius of gyration of {} mm (from {} g mm^2 and {} kg), but its joints are {} mm from its axis",
-                ["x", "y", "z"][axis],
-                figure(radius * 1e3),
-                figure(moment * 1e9),
-                figure(body.mass),
-                figure(size * 1e3)
+                "about {name} the platform has a radius of gyration of {gyration} mm (from {moment} g mm^2 and {kilograms} kg), but its joints are {joints} mm from its axis"
             ),
             "check the units of `platform.inertia` (kg m^2 or g mm^2) and `platform.mass`; the moments are about the centre of mass",
         );
@@ -411,14 +399,12 @@ fn moments_fit_symmetry(facts: &Facts, found: &mut Findings) {
     }
     // The one further from I_zz is suspected.
     let odd = usize::from(from_yy > from_xx);
+    let [xx, yy, ratio] = [xx * 1e9, yy * 1e9, ratio].map(figure);
     found.add(
         MOMENTS_UNEVEN,
         &format!("platform.inertia[{odd}]"),
         format!(
-            "I_xx is {} g mm^2 and I_yy {} g mm^2, a ratio of {}, but the platform's joints are spread equally along x and y",
-            figure(xx * 1e9),
-            figure(yy * 1e9),
-            figure(ratio)
+            "I_xx is {xx} g mm^2 and I_yy {yy} g mm^2, a ratio of {ratio}, but the platform's joints are spread equally along x and y"
         ),
         "`platform.inertia` is I_xx, I_yy, I_zz in {P}, with z along the axis of the hexapod: check their order",
     );
@@ -450,14 +436,12 @@ fn moments_about_the_centre(facts: &Facts, found: &mut Findings) {
     if spread.is_nan() || spread < height {
         return;
     }
+    let [mass, spread, base] = [body.mass, spread * 1e3, height * 1e3].map(figure);
     found.add(
         MOMENTS_ELSEWHERE,
         "platform.inertia[0]",
         format!(
-            "with these moments and {} kg the mass of the platform is spread {} mm (rms) along z about its centre, but the base is only {} mm away",
-            figure(body.mass),
-            figure(spread * 1e3),
-            figure(height * 1e3)
+            "with these moments and {mass} kg the mass of the platform is spread {spread} mm (rms) along z about its centre, but the base is only {base} mm away"
         ),
         &format!(
             "`platform.inertia` is about the centre of mass: if they are about the base's origin, subtract mass x height^2 = {} g mm^2 from I_xx and I_yy; also check their unit",

@@ -176,14 +176,11 @@ fn tables_fit(facts: &Facts, found: &mut Findings) {
                 "check the unit (B or KiB); `specgen build` measures the actual need",
             );
         } else if declared > LOOSE * least.max(if name == "stack" { 1024 } else { 4096 }) {
+            let [mebibytes, kibibytes] = [declared as f64 / 1_048_576.0, least as f64 / 1024.0].map(figure);
             found.add(
                 BUDGET_LOOSE,
                 &key,
-                format!(
-                    "`{key}` is {} MiB; the tables take {} KiB",
-                    figure(declared as f64 / 1_048_576.0),
-                    figure(least as f64 / 1024.0)
-                ),
+                format!("`{key}` is {mebibytes} MiB; the tables take {kibibytes} KiB"),
                 "a budget that no controller can exceed has no effect: check the unit (KiB or MiB)",
             );
         }

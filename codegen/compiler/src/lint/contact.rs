@@ -107,16 +107,13 @@ fn work_piece(facts: &Facts, found: &mut Findings) {
         if value == 0.0 || SOUND_WORK_PIECE.contains(&ratio) {
             continue;
         }
+        let (name, times, part, platform) = (AXES[axis], figure(ratio), figure(value), figure(stiffness[axis]));
         found.add_off(
             times_beyond(ratio, &SOUND_WORK_PIECE),
             WORK_PIECE_ODD,
             &format!("control.environment.stiffness[{axis}]"),
             format!(
-                "along {} the work piece is {} times as stiff as the platform on its legs ({} against {})",
-                AXES[axis],
-                figure(ratio),
-                figure(value),
-                figure(stiffness[axis])
+                "along {name} the work piece is {times} times as stiff as the platform on its legs ({part} against {platform})"
             ),
             "too soft to matter or too stiff to move against: check the unit (N/m or N/um, N m/rad); 0 means no contact on that axis",
         );
@@ -137,16 +134,13 @@ fn lever_of_contact(facts: &Facts, found: &mut Findings) {
         if lever <= LONGEST_LEVER * radius {
             continue;
         }
+        let (angular, name, linear, arm) = (figure(stiffness[axis]), AXES[axis], figure(along), figure(lever * 1e3));
+        let joints = figure(radius * 1e3);
         found.add(
             CONTACT_LEVER,
             &format!("control.environment.stiffness[{axis}]"),
             format!(
-                "{} N m/rad about {} with {} N/m means a lever arm of {} mm, but the platform's joints are only {} mm from its axis",
-                figure(stiffness[axis]),
-                AXES[axis],
-                figure(along),
-                figure(lever * 1e3),
-                figure(radius * 1e3)
+                "{angular} N m/rad about {name} with {linear} N/m means a lever arm of {arm} mm, but the platform's joints are only {joints} mm from its axis"
             ),
             "the rotational stiffness of a contact is its translational stiffness times the lever arm squared: check the units of `control.environment.stiffness`, N/m and N m/rad",
         );

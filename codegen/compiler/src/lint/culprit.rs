@@ -106,13 +106,9 @@ pub fn in_order(source: &SpecSource, findings: &mut Vec<Diagnostic>) {
     // Prefer the finding about the same item of the list.
     let own =
         findings.iter().position(|one| own(one) && one.key == culprit.key).or_else(|| findings.iter().position(own));
-    let explains = format!(
-        "if {}, {} of {} findings would disappear{}",
-        culprit.how,
-        culprit.explained,
-        culprit.of,
-        culprit.hint.map_or_else(String::new, |hint| format!(": {hint}"))
-    );
+    let (how, explained, of) = (&culprit.how, culprit.explained, culprit.of);
+    let hint = culprit.hint.map_or_else(String::new, |hint| format!(": {hint}"));
+    let explains = format!("if {how}, {explained} of {of} findings would disappear{hint}");
     let first = match own {
         Some(at) => {
             let mut own = findings.remove(at);

@@ -234,16 +234,14 @@ fn lag_fits_slew(facts: &Facts, found: &mut Findings) {
     if off <= 1.0 {
         return;
     }
+    let [lag, volts, starts] = [amplifier.lag * 1e3, high - low, (high - low) / amplifier.lag * 1e-3].map(figure);
+    let slew = figure(actuator.slew_rate * 1e-3);
     found.add_off(
         off,
         LAG_AGAINST_SLEW,
         "amplifier.lag",
         format!(
-            "with a lag of {} ms a step of {} V starts at {} V/ms, but `actuator.slew_rate` is {} V/ms",
-            figure(amplifier.lag * 1e3),
-            figure(high - low),
-            figure((high - low) / amplifier.lag * 1e-3),
-            figure(actuator.slew_rate * 1e-3)
+            "with a lag of {lag} ms a step of {volts} V starts at {starts} V/ms, but `actuator.slew_rate` is {slew} V/ms"
         ),
         "check the units of `amplifier.lag` (ms or us) and `actuator.slew_rate` (V/ms or V/s)",
     );
@@ -257,16 +255,14 @@ fn current_fits_slew(facts: &Facts, found: &mut Findings) {
     if needed <= current {
         return;
     }
+    let [microfarads, slew, amperes] = [capacitance * 1e6, model.actuator.slew_rate * 1e-3, needed].map(figure);
+    let supplied = figure(current);
     found.add_off(
         needed / current,
         CURRENT_AGAINST_SLEW,
         "amplifier.current",
         format!(
-            "{} uF at {} V/ms need {} A, but the amplifier supplies {} A",
-            figure(capacitance * 1e6),
-            figure(model.actuator.slew_rate * 1e-3),
-            figure(needed),
-            figure(current)
+            "{microfarads} uF at {slew} V/ms need {amperes} A, but the amplifier supplies {supplied} A"
         ),
         &format!(
             "the amplifier can slew at {} V/ms: write that as `actuator.slew_rate`, or check `actuator.capacitance` (of a whole leg) and `amplifier.current` (mA or A)",
@@ -317,16 +313,13 @@ fn capacitance_of_the_stacks(facts: &Facts, found: &mut Findings) {
     if off <= 1.0 {
         return;
     }
+    let [microfarads, volts, taken, stored] = [capacitance * 1e6, volts, charged / 2.0, blocked / 2.0].map(figure);
     found.add_off(
         off,
         CAPACITANCE_ODD,
         "actuator.capacitance",
         format!(
-            "charging {} uF to {} V takes {} J, but the blocked leg stores {} J (stiffness x stroke^2 / 2)",
-            figure(capacitance * 1e6),
-            figure(volts),
-            figure(charged / 2.0),
-            figure(blocked / 2.0)
+            "charging {microfarads} uF to {volts} V takes {taken} J, but the blocked leg stores {stored} J (stiffness x stroke^2 / 2)"
         ),
         "ceramics convert at most half of the electrical energy: check the unit of `actuator.capacitance` (uF or nF; of a whole leg), and `actuator.axial_stiffness`",
     );
@@ -341,17 +334,13 @@ fn converter_step(facts: &Facts, found: &mut Findings) {
     if step <= COARSEST_STEP * actuator.stroke {
         return;
     }
+    let [code, motion, share] = [volts * 1e3, step * 1e9, step / actuator.stroke].map(figure);
+    let stroke = figure(actuator.stroke * 1e6);
     found.add_off(
         step / (COARSEST_STEP * actuator.stroke),
         CONVERTER_COARSE,
         "dac.bits",
-        format!(
-            "one code of {} mV moves a leg by {} nm, {} of its stroke of {} um",
-            figure(volts * 1e3),
-            figure(step * 1e9),
-            figure(step / actuator.stroke),
-            figure(actuator.stroke * 1e6)
-        ),
+        format!("one code of {code} mV moves a leg by {motion} nm, {share} of its stroke of {stroke} um"),
         "16 bits or more are usual; check `dac.bits` and `dac.range`, which is in volts at the stack",
     );
 }
@@ -363,13 +352,12 @@ fn converter_range(facts: &Facts, found: &mut Findings) {
         return;
     }
     let item = usize::from(high - to >= from - low);
+    let [span, used] = [high - low, to - from].map(figure);
     found.add(
         CONVERTER_WIDE,
         &format!("dac.range[{item}]"),
         format!(
-            "the converter spans {} V, but the stacks use only {} V of it",
-            figure(high - low),
-            figure(to - from)
+            "the converter spans {span} V, but the stacks use only {used} V of it"
         ),
         "two or more bits of the converter are never used: check `dac.range`, in volts at the stack, and `actuator.voltage`",
     );
@@ -384,13 +372,12 @@ fn rest_without_power(facts: &Facts, found: &mut Findings) {
     if rest == off {
         return;
     }
+    let [volts, jump] = [rest, (rest - off).abs() * model.actuator.leg_gain() * 1e6].map(figure);
     found.add(
         REST_NOT_ZERO,
         "supervisor.rest_voltage",
         format!(
-            "the legs rest at {} V, but stacks discharge to 0 V when their amplifiers are off: a leg jumps by {} um when they are switched on",
-            figure(rest),
-            figure((rest - off).abs() * model.actuator.leg_gain() * 1e6)
+            "the legs rest at {volts} V, but stacks discharge to 0 V when their amplifiers are off: a leg jumps by {jump} um when they are switched on"
         ),
         "leave `supervisor.rest_voltage` out, unless the amplifiers themselves ramp slowly when they switch",
     );

@@ -54,12 +54,9 @@ fn other_frame(facts: &Facts, found: &mut Findings) {
     let mean = |joints: &[[f64; 3]; 6]| joints.iter().fold(0.0, |sum, joint| sum + joint[2]) / 6.0;
     let (base, platform) = (mean(&model.geometry.base_joints), mean(&model.geometry.platform_joints));
     let mut say = |key: String, z: f64, to: &str, help: &str| {
-        let message = format!(
-            "`{key}` is {} mm {} {to} along z, and `geometry.height` is {} mm",
-            figure(libm::fabs(z) * 1e3),
-            if z < 0.0 { "below" } else { "above" },
-            figure(height * 1e3)
-        );
+        let (distance, side) = (figure(libm::fabs(z) * 1e3), if z < 0.0 { "below" } else { "above" });
+        let height = figure(height * 1e3);
+        let message = format!("`{key}` is {distance} mm {side} {to} along z, and `geometry.height` is {height} mm");
         found.add(OTHER_FRAME, &key, message, help);
     };
     if heights_off(platform, height) == Some(-1.0) {

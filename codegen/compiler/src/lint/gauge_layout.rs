@@ -157,15 +157,11 @@ fn slip_of_one(facts: &Facts, found: &mut Findings) {
     } else {
         "do not measure every motion".to_owned()
     };
+    let (what, key, best) = (&first.what, &first.key, figure(*best));
     found.add(
         GAUGE_SLIP,
         &first.key,
-        format!(
-            "the gauges {seen}; with {} in `{}` changed, the ratio would be {}",
-            first.what,
-            first.key,
-            figure(*best)
-        ),
+        format!("the gauges {seen}; with {what} in `{key}` changed, the ratio would be {best}"),
         &format!(
             "check the signs and the order of the coordinates in {}",
             keys.iter().map(|key| format!("`{key}`")).collect::<Vec<_>>().join(", ")

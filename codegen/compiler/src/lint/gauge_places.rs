@@ -238,13 +238,12 @@ fn turned_layout(facts: &Facts, found: &mut Findings) {
     if angles.len() < FEWEST || is_meant || angles.iter().any(|(_, angle)| apart(*angle) > ALIKE) {
         return;
     }
+    let (count, degrees) = (angles.len(), figure(libm::fabs(first)));
     found.add(
         LAYOUT_TURNED,
         &format!("gauge[{gauge}].direction"),
         format!(
-            "the {} gauges that measure across the axis are all rotated by {} deg from their radius or tangent",
-            angles.len(),
-            figure(libm::fabs(first))
+            "the {count} gauges that measure across the axis are all rotated by {degrees} deg from their radius or tangent"
         ),
         "points and directions are both in {B}: check that both use its axes",
     );
@@ -262,14 +261,13 @@ fn size_of_pattern(facts: &Facts, found: &mut Findings) {
     if far >= NARROWEST * radius || far == 0.0 {
         return;
     }
+    let [farthest, joints] = [far * 1e3, radius * 1e3].map(figure);
     found.add_off(
         NARROWEST * radius / far,
         LAYOUT_SMALL,
         "gauge[0].point",
         format!(
-            "all gauges are within {} mm of the axis, but the platform's joints are {} mm from it",
-            figure(far * 1e3),
-            figure(radius * 1e3)
+            "all gauges are within {farthest} mm of the axis, but the platform's joints are {joints} mm from it"
         ),
         "check the unit of the points (mm or cm), or place the gauges further apart: this close together they hardly measure a rotation",
     );
@@ -287,28 +285,26 @@ fn size_of_layout(facts: &Facts, found: &mut Findings) {
         let far = libm::sqrt(pierced.iter().fold(0.0, |sum, part| sum + part * part));
         if far.is_nan() || far <= DETACHED * radius {
             if let Some(axis) = aside(&pierced, &n, radius) {
+                let (distance, along) = (figure(pierced[axis] * 1e3), ["x", "y", "z"][axis]);
+                let joints = figure(radius * 1e3);
                 found.add(
                     GAUGE_FAR,
                     &format!("gauge[{gauge}].point[{axis}]"),
                     format!(
-                        "the line of gauge {gauge} meets its target {} mm along {} from P_C, but the platform's joints are {} mm from it",
-                        figure(pierced[axis] * 1e3),
-                        ["x", "y", "z"][axis],
-                        figure(radius * 1e3)
+                        "the line of gauge {gauge} meets its target {distance} mm along {along} from P_C, but the platform's joints are {joints} mm from it"
                     ),
                     "check the order and the units of `point`: x, y, z in {B}, whose origin is in the base",
                 );
             }
             continue;
         }
+        let [distance, joints] = [far * 1e3, radius * 1e3].map(figure);
         found.add_off(
             far / (DETACHED * radius),
             GAUGE_FAR,
             &format!("gauge[{gauge}].point"),
             format!(
-                "the line of gauge {gauge} meets its target {} mm from P_C, but the platform's joints are {} mm from it",
-                figure(far * 1e3),
-                figure(radius * 1e3)
+                "the line of gauge {gauge} meets its target {distance} mm from P_C, but the platform's joints are {joints} mm from it"
             ),
             "check `point` and `direction` (in {B}), `target_point` and `target_normal` (in {P}, from P_C) of the gauge",
         );

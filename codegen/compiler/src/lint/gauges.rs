@@ -272,14 +272,12 @@ fn noise_of_a_step(facts: &Facts, found: &mut Findings) {
     if noise == 0.0 || noise >= QUIETEST * step {
         return;
     }
+    let [rms, share, code] = [noise * 1e9, noise / step, step * 1e9].map(figure);
     found.add(
         GAUGE_QUIET,
         "sensor.noise",
         format!(
-            "a noise of {} nm rms is only {} of the converter's step of {} nm",
-            figure(noise * 1e9),
-            figure(noise / step),
-            figure(step * 1e9)
+            "a noise of {rms} nm rms is only {share} of the converter's step of {code} nm"
         ),
         "noise this far below the step cannot be measured: check `sensor.bits`, `sensor.range` and the unit of `sensor.noise` (nm or pm), or leave the noise out",
     );
@@ -296,17 +294,13 @@ fn noise_of_many_steps(facts: &Facts, found: &mut Findings) {
     if facts.model.sensor.bits > FINE_BITS || noise <= NOISIEST * step || is_known {
         return;
     }
+    let (rms, steps, bits) = (figure(noise * 1e9), figure(noise / step), facts.model.sensor.bits);
+    let code = figure(step * 1e9);
     found.add_off(
         beyond,
         GAUGE_NOISY,
         "sensor.noise",
-        format!(
-            "a noise of {} nm rms is {} steps of the gauge's converter of {} bits, {} nm each",
-            figure(noise * 1e9),
-            figure(noise / step),
-            facts.model.sensor.bits,
-            figure(step * 1e9)
-        ),
+        format!("a noise of {rms} nm rms is {steps} steps of the gauge's converter of {bits} bits, {code} nm each"),
         "a converter is matched to its gauge: check the unit of `sensor.noise` (nm or um; rms) and of `sensor.range`",
     );
 }
@@ -327,15 +321,11 @@ fn range_centred(facts: &Facts, found: &mut Findings) {
     if !asymmetric {
         return;
     }
+    let [from, to, stroke] = [low * 1e6, high * 1e6, stroke * 1e6].map(figure);
     found.add(
         GAUGE_LOPSIDED,
         &format!("sensor.range[{item}]"),
-        format!(
-            "the gauge measures from {} um to {} um, but the stroke is {} um",
-            figure(low * 1e6),
-            figure(high * 1e6),
-            figure(stroke * 1e6)
-        ),
+        format!("the gauge measures from {from} um to {to} um, but the stroke is {stroke} um"),
         "check the unit and digits of both ends of `sensor.range`",
     );
 }
@@ -350,14 +340,11 @@ fn range_beyond_zero(facts: &Facts, found: &mut Findings) {
             if end == 0.0 || libm::fabs(end) >= END_AT_ZERO * (range[1] - range[0]) {
                 continue;
             }
+            let [from, to] = [range[0] * scale, range[1] * scale].map(figure);
             found.add(
                 RANGE_AT_ZERO,
                 &format!("{name}[{item}]"),
-                format!(
-                    "a range from {} {unit} to {} {unit} has an end that is almost 0",
-                    figure(range[0] * scale),
-                    figure(range[1] * scale)
-                ),
+                format!("a range from {from} {unit} to {to} {unit} has an end that is almost 0"),
                 &format!("check the unit of this end of `{name}`; write 0 if that is intended"),
             );
         }
@@ -387,15 +374,11 @@ fn range_too_wide(facts: &Facts, found: &mut Findings) {
         return;
     }
     let beside = if noise > 0.0 { format!(", {} times its noise", figure(step / noise)) } else { String::new() };
+    let [span, times, code] = [(high - low) * 1e6, (high - low) / seen, step * 1e9].map(figure);
     found.add(
         GAUGE_COARSE,
         "sensor.range",
-        format!(
-            "the gauge spans {} um, {} times the motion to measure; one code is {} nm{beside}",
-            figure((high - low) * 1e6),
-            figure((high - low) / seen),
-            figure(step * 1e9)
-        ),
+        format!("the gauge spans {span} um, {times} times the motion to measure; one code is {code} nm{beside}"),
         "check the unit and digits of `sensor.range`; a wide range needs more `sensor.bits`",
     );
 }
@@ -407,16 +390,12 @@ fn step_against_stroke(facts: &Facts, found: &mut Findings) {
     if step <= COARSEST_STEP * stroke {
         return;
     }
+    let [code, share, travel] = [step * 1e9, step / stroke, stroke * 1e6].map(figure);
     found.add_off(
         step / (COARSEST_STEP * stroke),
         GAUGE_COARSE,
         "sensor.bits",
-        format!(
-            "one code of the gauge is {} nm, {} of the stroke of {} um",
-            figure(step * 1e9),
-            figure(step / stroke),
-            figure(stroke * 1e6)
-        ),
+        format!("one code of the gauge is {code} nm, {share} of the stroke of {travel} um"),
         "16 bits or more are usual; check `sensor.range` and `sensor.bits`",
     );
 }
@@ -454,15 +433,11 @@ fn odd_coordinates(facts: &Facts, found: &mut Findings) {
             if value.abs() < ROUNDING || value.abs() >= NEARLY_ZERO * radius {
                 continue;
             }
+            let (name, value, radius) = (["x", "y", "z"][axis], amount(0, value), figure(radius * 1e3));
             found.add(
                 COORDINATE_ODD,
                 &format!("{key}[{axis}]"),
-                format!(
-                    "{} of `{key}` is {}, but the platform has a radius of {} mm",
-                    ["x", "y", "z"][axis],
-                    amount(0, value),
-                    figure(radius * 1e3)
-                ),
+                format!("{name} of `{key}` is {value}, but the platform has a radius of {radius} mm"),
                 "check the unit (mm or um); write \"0 mm\" if the centre is intended",
             );
         }

@@ -150,13 +150,12 @@ fn joints_apart(facts: &Facts, found: &mut Findings) {
         } else {
             format!("geometry.{body}_angle")
         };
+        let [distance, length] = [gap * 1e3, legs.shortest() * 1e3].map(figure);
         found.add(
             JOINTS_TOUCH,
             &key,
             format!(
-                "joints {i} and {j} of the {body} are {} mm apart, for legs of {} mm",
-                figure(gap * 1e3),
-                figure(legs.shortest() * 1e3)
+                "joints {i} and {j} of the {body} are {distance} mm apart, for legs of {length} mm"
             ),
             &format!(
                 "check the unit of `{key}`: with an angle of a few degrees, the joints of a pair are some millimetres apart"
@@ -173,14 +172,11 @@ fn joints_turn(facts: &Facts, found: &mut Findings) {
     if angle <= most {
         return;
     }
+    let [turn, limit] = [angle * 1e3, most * 1e3].map(figure);
     found.add(
         JOINT_ANGLE,
         "leg.joint_angle",
-        format!(
-            "in the declared workspace a joint at the {end} turns by {} mrad, but its limit is {} mrad",
-            figure(angle * 1e3),
-            figure(most * 1e3)
-        ),
+        format!("in the declared workspace a joint at the {end} turns by {turn} mrad, but its limit is {limit} mrad"),
         "reduce [workspace], or check the unit of `leg.joint_angle` (mrad or deg)",
     );
 }
@@ -203,14 +199,11 @@ fn base_is_wider(facts: &Facts, found: &mut Findings) {
     } else {
         ["geometry.base_joints", "geometry.platform_joints"]
     };
+    let [platform, base] = [platform * 1e3, base * 1e3].map(figure);
     found.add(
         PLATFORM_WIDER,
         key,
-        format!(
-            "the platform's joints are {} mm from the axis, those of the base {} mm",
-            figure(platform * 1e3),
-            figure(base * 1e3)
-        ),
+        format!("the platform's joints are {platform} mm from the axis, those of the base {base} mm"),
         &format!(
             "check that `{key}` and `{other}` are not swapped; a platform wider than its base is possible but unusual"
         ),
@@ -244,15 +237,13 @@ fn proportions(facts: &Facts, found: &mut Findings) {
     } else {
         String::new()
     };
+    let [base, platform, height] = [sizes[0] * 1e3, sizes[1] * 1e3, sizes[2] * 1e3].map(figure);
     found.add_off(
         libm::exp(apart[odd]) / OUT_OF_PROPORTION,
         SIZES_APART,
         keys[odd],
         format!(
-            "base joints are {} mm from the axis and platform joints {} mm, at a height of {} mm",
-            figure(sizes[0] * 1e3),
-            figure(sizes[1] * 1e3),
-            figure(sizes[2] * 1e3)
+            "base joints are {base} mm from the axis and platform joints {platform} mm, at a height of {height} mm"
         ),
         &format!(
             "check the unit of `{}`{radius}: base, platform and height are of similar size on most hexapods{width}",

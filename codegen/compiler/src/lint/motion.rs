@@ -243,15 +243,13 @@ fn moves_within_slew(facts: &Facts, found: &mut Findings) {
         if slew <= actuator.slew_rate {
             continue;
         }
+        let (fast, name, needed) = (amount(axis, speed), AXES[axis], figure(slew * 1e-3));
+        let slew_rate = figure(actuator.slew_rate * 1e-3);
         found.add(
             MOVE_BEYOND_SLEW,
             &format!("control.setpoint.speed[{axis}]"),
             format!(
-                "a speed of {}/s along {} needs {} V/ms, but `actuator.slew_rate` is {} V/ms",
-                amount(axis, speed),
-                AXES[axis],
-                figure(slew * 1e-3),
-                figure(actuator.slew_rate * 1e-3)
+                "a speed of {fast}/s along {name} needs {needed} V/ms, but `actuator.slew_rate` is {slew_rate} V/ms"
             ),
             &format!(
                 "at most {}/s is within the slew rate; check the units of both",
@@ -269,15 +267,11 @@ fn moves_end(facts: &Facts, found: &mut Findings) {
         if time <= LONGEST_MOVE {
             continue;
         }
+        let (speed, name, seconds) = (amount(axis, speed), AXES[axis], figure(time));
         found.add(
             MOVE_SLOW,
             &format!("control.setpoint.speed[{axis}]"),
-            format!(
-                "at {}/s a move across the workspace along {} takes {} s",
-                amount(axis, speed),
-                AXES[axis],
-                figure(time)
-            ),
+            format!("at {speed}/s a move across the workspace along {name} takes {seconds} s"),
             "check the units of `control.setpoint.speed` and [workspace]",
         );
     }
@@ -319,14 +313,11 @@ fn limits_bind(facts: &Facts, found: &mut Findings) {
                 format!("has no effect: an acceleration of {} is reached within a tick", shown(acceleration, "s^2")),
             );
         } else if acceleration * acceleration / jerk > 50.0 * NEVER * speed {
+            let (most, below) = (shown(acceleration, "s^2"), shown(speed, "s"));
             say(
                 "jerk",
                 shown(jerk, "s^3"),
-                format!(
-                    "is so low that an acceleration of {} is never reached below a speed of {}",
-                    shown(acceleration, "s^2"),
-                    shown(speed, "s")
-                ),
+                format!("is so low that an acceleration of {most} is never reached below a speed of {below}"),
             );
         }
     }
@@ -361,19 +352,15 @@ fn rotations_beside_translations(facts: &Facts, found: &mut Findings) {
         if !found.model.spans.contains_key(&key) || !(faster || slower) {
             continue;
         }
+        let [angle, at_joints, way] = [about, radius * about * 1e3, along * 1e3].map(figure);
+        let [length, turn] = unit;
+        let times = figure(if faster { ratios[0] } else { 1.0 / ratios[0] });
+        let more = if faster { "less" } else { "more" };
         found.add(
             LIMITS_APART,
             &format!("{key}[3]"),
             format!(
-                "rotations are limited to {} {}, which is {} {} at the joints; translations are limited to {} {}, {} times {}",
-                figure(about),
-                unit[1],
-                figure(radius * about * 1e3),
-                unit[0],
-                figure(along * 1e3),
-                unit[0],
-                figure(if faster { ratios[0] } else { 1.0 / ratios[0] }),
-                if faster { "less" } else { "more" }
+                "rotations are limited to {angle} {turn}, which is {at_joints} {length} at the joints; translations are limited to {way} {length}, {times} times {more}"
             ),
             &format!("check the units of `{key}`: deg, mrad and rad, um and mm"),
         );
@@ -391,14 +378,12 @@ fn stops_take_ticks(facts: &Facts, found: &mut Findings) {
         if fastest / limit >= WITHIN_TICK * tick {
             continue;
         }
+        let (limit, name, speed) = (amount(axis, limit), AXES[axis], amount(axis, fastest));
         found.add(
             LIMIT_WITHOUT_EFFECT,
             &format!("control.setpoint.stop_acceleration[{axis}]"),
             format!(
-                "a limit of {}/s^2 on {} has no effect: it stops a speed of {}/s within a tick",
-                amount(axis, limit),
-                AXES[axis],
-                amount(axis, fastest)
+                "a limit of {limit}/s^2 on {name} has no effect: it stops a speed of {speed}/s within a tick"
             ),
             "check the unit of `control.setpoint.stop_acceleration`, or leave it out: the compiler derives it from the modes",
         );
@@ -415,14 +400,11 @@ fn correction_moves_codes(facts: &Facts, found: &mut Findings) {
     if correction >= FEWEST_CODES * code {
         return;
     }
+    let [most, step] = [correction * 1e9, code * 1e9].map(figure);
     found.add(
         LIMIT_WITHOUT_EFFECT,
         "control.correction",
-        format!(
-            "a correction of at most {} nm has no effect: one code of the converter moves a leg by {} nm",
-            figure(correction * 1e9),
-            figure(code * 1e9)
-        ),
+        format!("a correction of at most {most} nm has no effect: one code of the converter moves a leg by {step} nm"),
         "check the unit (nm or um)",
     );
 }
@@ -435,15 +417,13 @@ fn stream_limit_binds(facts: &Facts, found: &mut Findings) {
         if step <= way(facts, axis) {
             continue;
         }
+        let (speed, step, name) = (amount(axis, speed), amount(axis, step), AXES[axis]);
+        let workspace = amount(axis, way(facts, axis));
         found.add(
             STREAM_UNCHECKED,
             &format!("control.setpoint.stream_speed[{axis}]"),
             format!(
-                "at {}/s a stream may jump by {} along {} in a tick, more than the whole workspace of {}",
-                amount(axis, speed),
-                amount(axis, step),
-                AXES[axis],
-                amount(axis, way(facts, axis))
+                "at {speed}/s a stream may jump by {step} along {name} in a tick, more than the whole workspace of {workspace}"
             ),
             "a jump across the workspace would be accepted: check the unit",
         );
@@ -457,15 +437,11 @@ fn streams_keep_up(facts: &Facts, found: &mut Findings) {
         if stream >= SLOWEST_STREAM * rules.speed[axis] {
             continue;
         }
+        let (streamed, name, own) = (amount(axis, stream), AXES[axis], amount(axis, rules.speed[axis]));
         found.add(
             STREAM_SLOW,
             &format!("control.setpoint.stream_speed[{axis}]"),
-            format!(
-                "streamed set-points may move at {}/s along {}, but moves at {}/s",
-                amount(axis, stream),
-                AXES[axis],
-                amount(axis, rules.speed[axis])
-            ),
+            format!("streamed set-points may move at {streamed}/s along {name}, but moves at {own}/s"),
             "check the units of `control.setpoint.stream_speed` and `control.setpoint.speed`: um/s or mm/s",
         );
     }
@@ -484,16 +460,12 @@ fn streams_within_slew(facts: &Facts, found: &mut Findings) {
     } else {
         format!("control.setpoint.stream_speed[{worst}]")
     };
+    let (name, speed, needed) = (AXES[worst], amount(worst, rules.stream_speed[worst]), figure(slews[worst] * 1e-3));
+    let slew_rate = figure(actuator.slew_rate * 1e-3);
     found.add(
         MOVE_BEYOND_SLEW,
         &key,
-        format!(
-            "a stream along {} at {}/s needs {} V/ms, but `actuator.slew_rate` is {} V/ms",
-            AXES[worst],
-            amount(worst, rules.stream_speed[worst]),
-            figure(slews[worst] * 1e-3),
-            figure(actuator.slew_rate * 1e-3)
-        ),
+        format!("a stream along {name} at {speed}/s needs {needed} V/ms, but `actuator.slew_rate` is {slew_rate} V/ms"),
         "check the units of `actuator.slew_rate` (V/ms or V/s) and `control.setpoint.stream_speed`",
     );
 }
@@ -515,15 +487,11 @@ fn workspace_is_used(facts: &Facts, found: &mut Findings) {
         } else {
             format!("workspace.rotation[{}]", axis - 3)
         };
+        let (name, bound, reached) = (AXES[axis], amount(axis, bound), amount(axis, reached));
         found.add(
             WORKSPACE_TINY,
             &key,
-            format!(
-                "{} is bounded to ±{}, but the legs reach ±{}",
-                AXES[axis],
-                amount(axis, bound),
-                amount(axis, reached)
-            ),
+            format!("{name} is bounded to ±{bound}, but the legs reach ±{reached}"),
             "check the unit; write 0 to lock an axis",
         );
     }

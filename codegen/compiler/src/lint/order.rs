@@ -190,13 +190,12 @@ fn legs_cross(facts: &Facts, found: &mut Findings) {
         pairs.iter().map(|pair| exchanged(*pair)).fold(now, |best, one| if one < best { one } else { best });
     if let Some((k, shorter)) = best.filter(|(_, shorter)| *shorter < limit && *shorter < best_pair) {
         let how = if k < 6 { format!("starting {k} joints later") } else { "in reverse order".to_owned() };
+        let [length, other] = [now * 1e3, shorter * 1e3].map(figure);
         found.add(
             LEGS_CROSS,
             "geometry.platform_joints[0]",
             format!(
-                "the legs cross: their total length is {} mm, but {} mm with the platform's joints listed {how}",
-                figure(now * 1e3),
-                figure(shorter * 1e3)
+                "the legs cross: their total length is {length} mm, but {other} mm with the platform's joints listed {how}"
             ),
             help,
         );
@@ -204,13 +203,12 @@ fn legs_cross(facts: &Facts, found: &mut Findings) {
     }
     let Some((i, j)) = pairs.iter().copied().find(crossing) else { return };
     let (now, then) = (leg(geometry, i, i) + leg(geometry, j, j), leg(geometry, i, j) + leg(geometry, j, i));
+    let [length, other] = [now * 1e3, then * 1e3].map(figure);
     found.add(
         LEGS_CROSS,
         &format!("geometry.platform_joints[{i}]"),
         format!(
-            "legs {i} and {j} cross: their total length is {} mm, but {} mm with their platform joints exchanged",
-            figure(now * 1e3),
-            figure(then * 1e3)
+            "legs {i} and {j} cross: their total length is {length} mm, but {other} mm with their platform joints exchanged"
         ),
         help,
     );

@@ -50,13 +50,12 @@ fn angles_of_pairs(facts: &Facts, found: &mut Findings) {
         if !found.model.spans.contains_key(&key) || angle <= WIDEST_PAIR {
             continue;
         }
+        let [apart, from_next] = [angle, 120.0 - angle].map(figure);
         found.add(
             PAIR_WIDE,
             &key,
             format!(
-                "the joints of a pair are {} deg apart, and {} deg from those of the next pair",
-                figure(angle),
-                figure(120.0 - angle)
+                "the joints of a pair are {apart} deg apart, and {from_next} deg from those of the next pair"
             ),
             &format!(
                 "`{key}` is the angle within a pair, the smaller of the two: write \"{} deg\" if the other angle was given",

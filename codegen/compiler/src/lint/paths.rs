@@ -276,12 +276,10 @@ fn slew(model: &Model, key: &str, demand: &PathDemand, found: &mut Findings) {
     if demand.slew <= limit / GAIN_SLACK {
         return;
     }
+    let (name, speed, needed) = (&demand.name, figure(demand.leg_speed * 1e6), figure(demand.slew * 1e-3));
+    let allowed = figure(limit * 1e-3);
     let message = format!(
-        "`{}` moves a leg at {} um/s, which needs about {} V/ms, but `actuator.slew_rate` is {} V/ms",
-        demand.name,
-        figure(demand.leg_speed * 1e6),
-        figure(demand.slew * 1e-3),
-        figure(limit * 1e-3)
+        "`{name}` moves a leg at {speed} um/s, which needs about {needed} V/ms, but `actuator.slew_rate` is {allowed} V/ms"
     );
     let help = format!(
         "run it {} times slower, or raise `actuator.slew_rate` if amplifier and stack allow it; check its unit (V/ms or V/s)",
@@ -300,15 +298,12 @@ fn current(model: &Model, key: &str, demand: &PathDemand, found: &mut Findings) 
     if needed <= limit / GAIN_SLACK {
         return;
     }
+    let (name, amperes, slew, supplied) = (&demand.name, figure(needed), figure(demand.slew * 1e-3), figure(limit));
     found.add(
         PATH_BEYOND_CURRENT,
         key,
         format!(
-            "`{}` charges a leg with about {} A (at {} V/ms), but `amplifier.current` is {} A",
-            demand.name,
-            figure(needed),
-            figure(demand.slew * 1e-3),
-            figure(limit)
+            "`{name}` charges a leg with about {amperes} A (at {slew} V/ms), but `amplifier.current` is {supplied} A"
         ),
         &format!(
             "run it {} times slower; or check `actuator.capacitance` and `amplifier.current`",
@@ -322,15 +317,13 @@ fn deflection(model: &Model, key: &str, demand: &PathDemand, found: &mut Finding
     if demand.deflection <= LARGEST_DEFLECTION * stroke {
         return;
     }
+    let (name, deflection, stroke) = (&demand.name, figure(demand.deflection * 1e6), figure(stroke * 1e6));
+    let acceleration = figure(demand.leg_acceleration);
     found.add(
         PATH_INERTIA,
         key,
         format!(
-            "the inertia along `{}` deflects a leg by {} um of its stroke of {} um (leg acceleration {} m/s^2)",
-            demand.name,
-            figure(demand.deflection * 1e6),
-            figure(stroke * 1e6),
-            figure(demand.leg_acceleration)
+            "the inertia along `{name}` deflects a leg by {deflection} um of its stroke of {stroke} um (leg acceleration {acceleration} m/s^2)"
         ),
         "run it slower; or check `platform.mass`, `platform.inertia` and `actuator.axial_stiffness`",
     );

@@ -84,14 +84,11 @@ fn frequencies(facts: &Facts, found: &mut Findings) {
     let Some(modes) = facts.legs.as_ref().and_then(|legs| legs.modes) else { return };
     for (index, limit) in facts.model.requirements.tracking.iter().enumerate() {
         let Some(frequency) = limit.frequency.filter(|frequency| *frequency > modes[0]) else { continue };
+        let [hertz, lowest] = [frequency, modes[0]].map(figure);
         found.add(
             PATH_EXCITES,
             &format!("requirements.tracking[{index}].frequency"),
-            format!(
-                "a limit at {} Hz is above the lowest mode of the platform, {} Hz",
-                figure(frequency),
-                figure(modes[0])
-            ),
+            format!("a limit at {hertz} Hz is above the lowest mode of the platform, {lowest} Hz"),
             "a tenth of the lowest mode is usual: check the unit of the frequency (Hz or kHz)",
         );
     }

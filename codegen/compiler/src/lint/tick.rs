@@ -37,14 +37,12 @@ fn fits_period(facts: &Facts, found: &mut Findings) {
     } else {
         (codes::TICK_TIGHT, "about as long as")
     };
+    let (taken, board, period) = (figure(tick * 1e6), &part.board, figure(period * 1e6));
     found.add(
         code,
         "timing.period",
         format!(
-            "a tick of such a controller takes about {} us on {}, {verdict} the period of {} us",
-            figure(tick * 1e6),
-            part.board,
-            figure(period * 1e6)
+            "a tick of such a controller takes about {taken} us on {board}, {verdict} the period of {period} us"
         ),
         &format!(
             "write, in [timing]: period = \"{} us\" or more, or name a faster part in `target.mcu`; `specgen build` estimates the tick from the image",

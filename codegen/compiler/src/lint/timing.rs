@@ -246,15 +246,11 @@ fn times_too_short(facts: &Facts, found: &mut Findings) {
         if time == 0.0 || time >= NOTHING * tick {
             continue;
         }
+        let [given, share, whole] = [time * 1e6, time / tick, tick * 1e6].map(figure);
         found.add(
             TIME_WITHOUT_EFFECT,
             &key,
-            format!(
-                "`{key}` is {} us, {} of a tick of {} us: it has no effect",
-                figure(time * 1e6),
-                figure(time / tick),
-                figure(tick * 1e6)
-            ),
+            format!("`{key}` is {given} us, {share} of a tick of {whole} us: it has no effect"),
             "check the unit (ms or us), or leave the key out",
         );
     }
@@ -267,13 +263,12 @@ fn lead_too_long(facts: &Facts, found: &mut Findings) {
     // The legs' own resonance delays them by a part of its period.
     let (dead_time, most) = (model.hysteresis.dead_time, LONGEST_DEAD_TIME * (lag + 1.0 / model.actuator.resonance));
     if dead_time > most {
+        let [ahead, delay] = [dead_time * 1e3, (lag + 1.0 / model.actuator.resonance) * 1e3].map(figure);
         found.add(
             LEAD_TOO_LONG,
             "hysteresis.dead_time",
             format!(
-                "the feed-forward runs {} ms ahead, but amplifier, tick and a period of the legs' resonance together delay by {} ms",
-                figure(dead_time * 1e3),
-                figure((lag + 1.0 / model.actuator.resonance) * 1e3)
+                "the feed-forward runs {ahead} ms ahead, but amplifier, tick and a period of the legs' resonance together delay by {delay} ms"
             ),
             "check the unit (ms or us); `specgen identify rate` measures it",
         );
@@ -283,13 +278,12 @@ fn lead_too_long(facts: &Facts, found: &mut Findings) {
         task.trajectories.iter().enumerate().map(|(index, one)| (format!("trajectory[{index}].lead"), one.lead));
     for (key, lead) in std::iter::once(("control.lead".to_owned(), task.lead)).chain(of_paths) {
         let Some(lead) = lead.filter(|lead| *lead > LARGEST_LEAD * lag) else { continue };
+        let [ahead, delay] = [lead * 1e3, lag * 1e3].map(figure);
         found.add(
             LEAD_TOO_LONG,
             &key,
             format!(
-                "the feed-forward runs {} ms ahead, but amplifier and tick together delay by {} ms",
-                figure(lead * 1e3),
-                figure(lag * 1e3)
+                "the feed-forward runs {ahead} ms ahead, but amplifier and tick together delay by {delay} ms"
             ),
             &format!(
                 "leave `{key}` out, and the compiler compensates the delay; or check its unit and that of `amplifier.lag`"
@@ -327,14 +321,11 @@ fn velocity_filter(facts: &Facts, found: &mut Findings) {
     if cutoff >= SLOWEST_FILTER * modes[0] {
         return;
     }
+    let [hertz, lowest] = [cutoff, modes[0]].map(figure);
     found.add(
         VELOCITY_FILTER_SLOW,
         "control.velocity_cutoff",
-        format!(
-            "the velocity is filtered at {} Hz, far below the lowest mode of {} Hz",
-            figure(cutoff),
-            figure(modes[0])
-        ),
+        format!("the velocity is filtered at {hertz} Hz, far below the lowest mode of {lowest} Hz"),
         "usual is at least the frequency of the lowest mode: check the unit (rad/s, not Hz)",
     );
 }
@@ -347,14 +338,12 @@ fn ticks_against_modes(facts: &Facts, found: &mut Findings) {
     if (FEWEST_TICKS..=MOST_TICKS).contains(&ticks) {
         return;
     }
+    let [hertz, ticks, microseconds] = [modes[0], ticks, tick * 1e6].map(figure);
     found.add(
         TICKS_AGAINST_MODES,
         "timing.period",
         format!(
-            "one period of the platform's lowest mode, {} Hz, has {} ticks of {} us",
-            figure(modes[0]),
-            figure(ticks),
-            figure(tick * 1e6)
+            "one period of the platform's lowest mode, {hertz} Hz, has {ticks} ticks of {microseconds} us"
         ),
         "ten to a hundred ticks are usual: check `timing.period`, and `actuator.axial_stiffness` and the masses, which determine the mode",
     );
@@ -367,15 +356,13 @@ fn gauges_in_time(facts: &Facts, found: &mut Findings) {
     if off <= 1.0 {
         return;
     }
+    let [late, ticks, tick] = [lag * 1e6, lag / tick, tick * 1e6].map(figure);
     found.add_off(
         off,
         GAUGE_LATE,
         "sensor.lag",
         format!(
-            "the gauges lag by {} us, {} ticks of {} us: the effect of a tick is measured long after it",
-            figure(lag * 1e6),
-            figure(lag / tick),
-            figure(tick * 1e6)
+            "the gauges lag by {late} us, {ticks} ticks of {tick} us: the effect of a tick is measured long after it"
         ),
         "check the unit (us or ms); a tick this much faster than its gauges gains nothing: lengthen `timing.period` or increase the bandwidth of the gauges",
     );
@@ -389,15 +376,12 @@ fn aliased_modes(facts: &Facts, found: &mut Findings) {
     let seen = |mode: &&f64| **mode * tick > 0.5 && share(**mode) > LARGEST_ALIAS;
     let Some(mode) = modes.iter().find(seen) else { return };
     let alias = (mode - libm::rint(mode * tick) / tick).abs();
+    let [hertz, half, alias, amplitude] = [*mode, 0.5 / tick, alias, share(*mode)].map(figure);
     found.add(
         MODE_ALIASED,
         "timing.period",
         format!(
-            "the platform's mode at {} Hz is above half the tick rate, {} Hz: it is aliased to {} Hz with {} times its amplitude",
-            figure(*mode),
-            figure(0.5 / tick),
-            figure(alias),
-            figure(share(*mode))
+            "the platform's mode at {hertz} Hz is above half the tick rate, {half} Hz: it is aliased to {alias} Hz with {amplitude} times its amplitude"
         ),
         &format!(
             "a period below {} us samples all modes without aliasing; or filter the gauges before sampling with a lag above {} us, and write that as `sensor.lag`",

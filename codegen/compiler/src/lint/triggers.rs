@@ -177,13 +177,12 @@ fn more_than_one(facts: &Facts, found: &mut Findings) {
         if stop <= start || step <= stop - start {
             continue;
         }
+        let (given, way) = (amount(trigger.axis, step), amount(trigger.axis, stop - start));
         found.add(
             TRIGGER_SINGLE,
             &key(index, trigger, "step"),
             format!(
-                "`step` of trigger[{index}] is {}, but from start to stop it is only {}: only the first position gives a pulse",
-                amount(trigger.axis, step),
-                amount(trigger.axis, stop - start)
+                "`step` of trigger[{index}] is {given}, but from start to stop it is only {way}: only the first position gives a pulse"
             ),
             "check the units of start, stop and step; set `stop` equal to `start` if one position is intended",
         );
@@ -241,14 +240,11 @@ fn above_noise(facts: &Facts, found: &mut Findings) {
         let (Some(noise), Some(hysteresis)) = (noise(facts), trigger.hysteresis) else { continue };
         let quiet = triggers::QUIET * noise[trigger.axis];
         if hysteresis < quiet * (1.0 - 1e-9) {
+            let (given, rms) = (amount(trigger.axis, hysteresis), amount(trigger.axis, noise[trigger.axis]));
             found.add(
                 TRIGGER_IN_NOISE,
                 &key(index, trigger, "hysteresis"),
-                format!(
-                    "`hysteresis` of trigger[{index}] is {}, but the measured pose has a noise of {} rms",
-                    amount(trigger.axis, hysteresis),
-                    amount(trigger.axis, noise[trigger.axis])
-                ),
+                format!("`hysteresis` of trigger[{index}] is {given}, but the measured pose has a noise of {rms} rms"),
                 &format!("leave it out, or write \"{}\" or more", amount(trigger.axis, 1.01 * quiet)),
             );
         }
@@ -264,14 +260,13 @@ fn pulses_apart(facts: &Facts, found: &mut Findings) {
         let (ticks, speed) = (triggers::width(trigger, period), task.setpoint.speed[trigger.axis]);
         let between = step / speed / period;
         if f64::from(ticks + 1) > between {
+            let (plural, fast) = (if ticks == 1 { "" } else { "s" }, amount(trigger.axis, speed));
+            let between = figure(between);
             found.add(
                 TRIGGERS_MERGE,
                 &format!("trigger[{index}].width"),
                 format!(
-                    "a pulse of trigger[{index}] takes {ticks} tick{} plus one before the next, but at {}/s a position is passed every {} ticks",
-                    if ticks == 1 { "" } else { "s" },
-                    amount(trigger.axis, speed),
-                    figure(between)
+                    "a pulse of trigger[{index}] takes {ticks} tick{plural} plus one before the next, but at {fast}/s a position is passed every {between} ticks"
                 ),
                 &format!(
                     "a step of \"{}\" leaves enough time; or write a shorter width",

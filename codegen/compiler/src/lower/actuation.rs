@@ -25,11 +25,10 @@ pub(super) fn lower(model: &Model, scalar: Scalar) -> Result<(Actuation, i32), V
     }
     let mut findings = Vec::new();
     if code_max - code_min < 2 * model.hysteresis.grid as i32 {
+        let (codes, grid) = (code_max - code_min + 1, &model.hysteresis.grid);
         findings.push(Diagnostic::at(&model.spans, &["dac.bits"], codes::TOO_FEW_CODES,
             format!(
-                "the converter has only {} codes between {volts_min} V and {volts_max} V, fewer than two per cell of the {}-cell Preisach grid",
-                code_max - code_min + 1,
-                model.hysteresis.grid
+                "the converter has only {codes} codes between {volts_min} V and {volts_max} V, fewer than two per cell of the {grid}-cell Preisach grid"
             ),
             "use a converter with more bits or a narrower range".to_owned(),
         ));

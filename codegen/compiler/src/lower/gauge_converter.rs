@@ -42,16 +42,14 @@ pub(super) fn unseen(model: &Model, sensing: Option<&Sensing>) -> Vec<Diagnostic
     let place = place.cloned().map_or(Place::Whole, Place::Spec);
     unseen
         .map(|(gauge, (_, [first, last]))| {
+            let (from, to) = (fixed(*first, 4), fixed(*last, 4));
             let message = format!(
-                "gauge {gauge} gives {} V to {} V over `sensor.range`, but its converter takes in {low} V to {high} V: it does not \
-                 see the reading zero",
-                fixed(*first, 4),
-                fixed(*last, 4)
+                "gauge {gauge} gives {from} V to {to} V over `sensor.range`, but its converter takes in {low} V to {high} V: it does not \
+                 see the reading zero"
             );
+            let (from, to) = (fixed(first - 1e-3, 3), fixed(last + 1e-3, 3));
             let help = format!(
-                "write input_range = [\"{} V\", \"{} V\"] or wider, or check the calibration",
-                fixed(first - 1e-3, 3),
-                fixed(last + 1e-3, 3)
+                "write input_range = [\"{from} V\", \"{to} V\"] or wider, or check the calibration"
             );
             Diagnostic::new(codes::GAUGE_INPUT, key, place.clone(), message, help)
         })

@@ -28,12 +28,8 @@ pub(super) fn identity(name: &str, origin: &Origin<'_>, scalar: Scalar) -> Strin
     } else {
         format!("{ASSUMED_MARK}{}\n", origin.assumed.join(ASSUMED_SEPARATOR))
     };
-    format!(
-        "{IDENTITY_MARK}specgen {}, platform {name}, f{}, spec {}\n{assumed}",
-        env!("CARGO_PKG_VERSION"),
-        scalar.bits(),
-        origin.digest
-    )
+    let (version, bits, digest) = (env!("CARGO_PKG_VERSION"), scalar.bits(), &origin.digest);
+    format!("{IDENTITY_MARK}specgen {version}, platform {name}, f{bits}, spec {digest}\n{assumed}")
 }
 
 /// The settings as words, and the checksum of all constants. The order is that of the emitted `integrity.rs`: identity, tables by their

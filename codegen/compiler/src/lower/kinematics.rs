@@ -131,14 +131,13 @@ fn degenerate(model: &Model) -> Diagnostic {
 
 fn too_large(model: &Model, displacement: f64, length: f64) -> Diagnostic {
     let key = "workspace.translation";
+    let (change, length) = (displacement * 1e3, length * 1e3);
     Diagnostic::at(
         &model.spans,
         &[key],
         codes::WORKSPACE_TOO_LARGE,
         format!(
-            "the declared workspace may change the length of a leg by {:.3} mm, more than a quarter of its {:.3} mm",
-            displacement * 1e3,
-            length * 1e3
+            "the declared workspace may change the length of a leg by {change:.3} mm, more than a quarter of its {length:.3} mm"
         ),
         "the difference-form kinematics is for small motions: reduce workspace.translation and workspace.rotation",
     )

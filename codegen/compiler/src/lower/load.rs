@@ -54,16 +54,12 @@ pub fn describe(load: &Load) -> String {
         Some(_) => ("to first order", format!("{first} operations in place of {whole}")),
         None => ("by the whole kernel", format!("{whole} operations; to first order {first}")),
     };
+    let (tracked_error, tolerance, tracked_load) = (nm(tracked.error), nm(load.tolerance), nm(tracked.load));
+    let (stop_error, stop_load, stream_error) = (nm(stops.error), nm(stops.load), nm(streams.error));
+    let stream_load = nm(streams.load);
     format!(
-        "  load of the legs under motion and gravity: {chosen}, {instead}\n    first order off by {} nm at most, tolerance {} nm, in moves and \
-         trajectories (load up to {} nm); {} of {} nm in stops, {} of {} nm in any permitted stream\n",
-        nm(tracked.error),
-        nm(load.tolerance),
-        nm(tracked.load),
-        nm(stops.error),
-        nm(stops.load),
-        nm(streams.error),
-        nm(streams.load)
+        "  load of the legs under motion and gravity: {chosen}, {instead}\n    first order off by {tracked_error} nm at most, tolerance {tolerance} nm, in moves and \
+         trajectories (load up to {tracked_load} nm); {stop_error} of {stop_load} nm in stops, {stream_error} of {stream_load} nm in any permitted stream\n"
     )
 }
 

@@ -3,6 +3,7 @@
 use crate::ir::{BoucWen, LEGS, Lead, RateModel, Resonance, Scalar};
 use specgen_identify::everett::EverettTable;
 use specgen_identify::leg_model::{Around, strokes};
+use specgen_identify::mean;
 use specgen_language::model::{Model, RateDependence};
 
 use specgen_runtime::bouc_wen::READ_OUT;
@@ -149,8 +150,4 @@ pub(super) fn lead(model: &Model, tables: &[EverettTable], around: &[Option<Arou
         resonance,
         limit: round((late + reach) * model.actuator.slew_rate * model.actuator.leg_gain()),
     })
-}
-
-fn mean(values: &[f64]) -> f64 {
-    values.iter().fold(0.0, |sum, value| sum + value) / values.len() as f64
 }

@@ -215,17 +215,14 @@ fn range_holds_workspace(model: &Model, layout: &Layout) -> Vec<Diagnostic> {
     } else {
         String::new()
     };
+    let (name, bound, beyond) = (AXES[axis], model.workspace.bounds()[axis] * scale, fixed(reading * 1e6, 3));
+    let (low, high) = (fixed(low * 1e6, 3), fixed(high * 1e6, 3));
     vec![finding(
         model,
         codes::GAUGE_RANGE,
         "sensor.range",
         format!(
-            "within the declared workspace, {} of ±{:.4} {unit} alone moves gauge {k} to {} µm, beyond its range of {} µm to {} µm",
-            AXES[axis],
-            model.workspace.bounds()[axis] * scale,
-            fixed(reading * 1e6, 3),
-            fixed(low * 1e6, 3),
-            fixed(high * 1e6, 3)
+            "within the declared workspace, {name} of ±{bound:.4} {unit} alone moves gauge {k} to {beyond} µm, beyond its range of {low} µm to {high} µm"
         ),
         format!("{less}gauges whose range includes {} µm; check the unit of sensor.range", fixed(reading * 1e6, 3)),
     )]

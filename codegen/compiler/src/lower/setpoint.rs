@@ -208,12 +208,8 @@ impl User {
                 continue;
             }
             if let Some((axis, value)) = self.outside(user) {
-                let message = format!(
-                    "{what} has {} = {}, outside the workspace of ±{}",
-                    AXES[axis],
-                    amount(axis, value),
-                    amount(axis, self.bound[axis])
-                );
+                let (name, value, bound) = (AXES[axis], amount(axis, value), amount(axis, self.bound[axis]));
+                let message = format!("{what} has {name} = {value}, outside the workspace of ±{bound}");
                 findings.push(Diagnostic::at(&model.spans, &[key], codes::ZERO_OUTSIDE, message, help));
             }
         }

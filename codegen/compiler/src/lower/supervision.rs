@@ -175,20 +175,17 @@ impl Times<'_> {
         if let Some(time) = given
             && time < least * (1.0 - 1e-9)
         {
+            let (usual, milliseconds) = (figure(otherwise.max(least) * 1e3), least * 1e3);
+            let (given, detection, period) = (time * 1e3, least * 1e3, self.model.timing.period * 1e3);
             self.findings.push(finding(
                 self.model,
                 codes::SUPERVISOR_TIME,
                 key,
                 format!(
-                    "`supervisor.{key}` is {:.6} ms, but detection takes {:.6} ms at a period of {:.6} ms",
-                    time * 1e3,
-                    least * 1e3,
-                    self.model.timing.period * 1e3
+                    "`supervisor.{key}` is {given:.6} ms, but detection takes {detection:.6} ms at a period of {period:.6} ms"
                 ),
                 format!(
-                    "leave {key} out: the default is {} ms; it must be at least {:.6} ms, or shorten timing.period",
-                    figure(otherwise.max(least) * 1e3),
-                    least * 1e3
+                    "leave {key} out: the default is {usual} ms; it must be at least {milliseconds:.6} ms, or shorten timing.period"
                 ),
             ));
         }
@@ -207,14 +204,13 @@ fn gauge_bounds(model: &Model, findings: &mut Vec<Diagnostic>) -> (f64, f64) {
     let stuck_motion = spec.stuck_motion.unwrap_or_else(|| defaults::stuck_motion(model, step));
     let least = FEWEST_STEPS * step;
     if stuck_motion < least * (1.0 - 1e-9) {
+        let (given, code) = (stuck_motion * 1e9, step * 1e9);
         findings.push(finding(
             model,
             codes::SUPERVISOR_BOUND,
             "stuck_motion",
             format!(
-                "`supervisor.stuck_motion` is {:.4} nm, but a step of the gauge's converter is {:.4} nm: a working gauge may not resolve it",
-                stuck_motion * 1e9,
-                step * 1e9
+                "`supervisor.stuck_motion` is {given:.4} nm, but a step of the gauge's converter is {code:.4} nm: a working gauge may not resolve it"
             ),
             format!("write stuck_motion = \"{:.4} nm\" or more", above(least * 1e9)),
         ));
@@ -222,19 +218,17 @@ fn gauge_bounds(model: &Model, findings: &mut Vec<Diagnostic>) -> (f64, f64) {
     let disagreement = spec.disagreement.unwrap_or_else(|| defaults::disagreement(model));
     let least = NOISE_MARGIN * noise + step;
     if disagreement < least {
+        let (write, fifth) = (above(least * 1e9), defaults::disagreement(model) * 1e6);
+        let (given, effect) = (disagreement * 1e9, least * 1e9);
         findings.push(finding(
             model,
             codes::SUPERVISOR_BOUND,
             "disagreement",
             format!(
-                "a disagreement of {:.4} nm is less than the effect of the gauge's noise and converter, {:.4} nm",
-                disagreement * 1e9,
-                least * 1e9
+                "a disagreement of {given:.4} nm is less than the effect of the gauge's noise and converter, {effect:.4} nm"
             ),
             format!(
-                "write disagreement = \"{:.4} nm\" or more; a fifth of the stroke is {:.4} um",
-                above(least * 1e9),
-                defaults::disagreement(model) * 1e6
+                "write disagreement = \"{write:.4} nm\" or more; a fifth of the stroke is {fifth:.4} um"
             ),
         ));
     }
@@ -281,12 +275,9 @@ fn no_range(model: &Model, axis: usize, full: f64, noise: f64) -> Diagnostic {
     }
     let (table, item, unit) =
         if axis < 3 { ("workspace.translation", axis, "um") } else { ("workspace.rotation", axis - 3, "urad") };
-    let message = format!(
-        "the gauges' noise amounts to {:.4} {unit} of {}, whose range is only {:.4} {unit}",
-        noise * 1e6,
-        AXES[axis],
-        full * 1e6
-    );
+    let (amounts, name, range) = (noise * 1e6, AXES[axis], full * 1e6);
+    let message =
+        format!("the gauges' noise amounts to {amounts:.4} {unit} of {name}, whose range is only {range:.4} {unit}");
     let help = format!(
         "write at least {:.4} {unit} there, so that a tracking error of {share} of the range is above the noise",
         above(noise / share * 1e6)

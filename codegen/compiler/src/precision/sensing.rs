@@ -20,16 +20,36 @@ const REFINEMENTS: u32 = 3;
 type Vectors = [[Double; 3]; 6];
 type Matrix = [[Double; 6]; 6];
 
+/// Constants of the gauges.
+struct Constants<T> {
+    direction: [[T; 3]; 6],
+    normal: [[T; 3]; 6],
+    skew: [[T; 3]; 6],
+    pierced: [[T; 3]; 6],
+    inverse: [[T; 6]; 6],
+    curvature: [[T; 6]; 6],
+    passes: usize,
+    arc_sine: Vec<T>,
+    arc_tangent: Vec<T>,
+}
+
 /// The gauges without relevant rounding. The layout in doubles counts as exact.
-struct Exact {
-    direction: Vectors,
-    normal: Vectors,
-    skew: Vectors,
-    pierced: Vectors,
-    inverse: Matrix,
-    curvature: Matrix,
-    arc_sine: Vec<Double>,
-    arc_tangent: Vec<Double>,
+type Exact = Constants<Double>;
+
+impl<T: Copy> Constants<T> {
+    fn gauges(&self) -> Gauges<'_, T> {
+        Gauges {
+            direction: self.direction,
+            normal: self.normal,
+            skew: self.skew,
+            pierced: self.pierced,
+            inverse: self.inverse,
+            curvature: self.curvature,
+            passes: self.passes,
+            arc_sine: &self.arc_sine,
+            arc_tangent: &self.arc_tangent,
+        }
+    }
 }
 
 fn product(a: &Matrix, b: &Matrix) -> Matrix {
@@ -82,22 +102,9 @@ impl Exact {
             pierced,
             curvature: product(&inverse, &second),
             inverse,
+            passes: PASSES,
             arc_sine,
             arc_tangent,
-        }
-    }
-
-    fn gauges(&self) -> Gauges<'_, Double> {
-        Gauges {
-            direction: self.direction,
-            normal: self.normal,
-            skew: self.skew,
-            pierced: self.pierced,
-            inverse: self.inverse,
-            curvature: self.curvature,
-            passes: PASSES,
-            arc_sine: &self.arc_sine,
-            arc_tangent: &self.arc_tangent,
         }
     }
 }
@@ -174,7 +181,7 @@ where
     let mut bound = [0.0; 6];
     for corner in boxes(&bounds) {
         let (found, record) = trace(|| {
-            let gauges = Constants::<SINGLE>::of(constants, exact, largest);
+            let gauges = Constants::<TracedNumber<SINGLE>>::traced(constants, exact, largest);
             let gauges = gauges.gauges();
             let series = TracedLegs::of(kinematics, legs, largest);
             let pose = core::array::from_fn(|axis| TracedNumber::coordinate(axis, corner[axis][0], corner[axis][1]));
@@ -225,22 +232,9 @@ where
     })
 }
 
-/// Constants of the controller with their rounding and truncation errors.
-struct Constants<const SINGLE: bool> {
-    direction: [[TracedNumber<SINGLE>; 3]; 6],
-    normal: [[TracedNumber<SINGLE>; 3]; 6],
-    skew: [[TracedNumber<SINGLE>; 3]; 6],
-    pierced: [[TracedNumber<SINGLE>; 3]; 6],
-    inverse: [[TracedNumber<SINGLE>; 6]; 6],
-    curvature: [[TracedNumber<SINGLE>; 6]; 6],
-    passes: usize,
-    arc_sine: Vec<TracedNumber<SINGLE>>,
-    arc_tangent: Vec<TracedNumber<SINGLE>>,
-}
-
-impl<const SINGLE: bool> Constants<SINGLE> {
-    /// For angles up to `largest`, rad.
-    fn of(constants: &Sensing, exact: &Exact, largest: f64) -> Self {
+impl<const SINGLE: bool> Constants<TracedNumber<SINGLE>> {
+    /// Constants of the controller with their rounding and truncation errors, for angles up to `largest`, rad.
+    fn traced(constants: &Sensing, exact: &Exact, largest: f64) -> Self {
         let vectors = |rows: &[[f64; 3]; 6], exact: &Vectors| {
             core::array::from_fn(|k| core::array::from_fn(|j| kept(rows[k][j], exact[k][j])))
         };
@@ -259,20 +253,6 @@ impl<const SINGLE: bool> Constants<SINGLE> {
             passes: constants.passes as usize,
             arc_sine: cut(&constants.arc_sine, &exact.arc_sine, square(libm::sin(largest))),
             arc_tangent: cut(&constants.arc_tangent, &exact.arc_tangent, square(libm::tan(largest))),
-        }
-    }
-
-    fn gauges(&self) -> Gauges<'_, TracedNumber<SINGLE>> {
-        Gauges {
-            direction: self.direction,
-            normal: self.normal,
-            skew: self.skew,
-            pierced: self.pierced,
-            inverse: self.inverse,
-            curvature: self.curvature,
-            passes: self.passes,
-            arc_sine: &self.arc_sine,
-            arc_tangent: &self.arc_tangent,
         }
     }
 }

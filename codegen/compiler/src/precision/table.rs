@@ -54,12 +54,10 @@ pub fn describe(precision: &Precision, scalar: Scalar) -> String {
     // Writing to a String cannot fail.
     let mut text = String::new();
     let single = precision.commanded.against_f64.is_some();
+    let (bits, poses, with) = (scalar.bits(), SAMPLES + 64, if single { " and with f64" } else { "" });
     let _ = writeln!(
         text,
-        "  rounding of f{} over the workspace: proven bound, and largest of {} poses compared with 106 bits{}",
-        scalar.bits(),
-        SAMPLES + 64,
-        if single { " and with f64" } else { "" }
+        "  rounding of f{bits} over the workspace: proven bound, and largest of {poses} poses compared with 106 bits{with}"
     );
     let _ = writeln!(
         text,

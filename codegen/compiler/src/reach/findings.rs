@@ -51,12 +51,10 @@ fn of_gauge_ends(model: &Model, reach: &Reach) -> Option<Diagnostic> {
     let seen = if high < reach.stroke { high } else { reach.stroke } - if low > 0.0 { low } else { 0.0 };
     // The paper's gauge covers four fifths; a much smaller range is in the wrong unit.
     let code = if seen < LEAST_SEEN * reach.stroke { codes::SENSOR_RANGE } else { codes::GAUGE_SHORT_OF_STROKE };
+    let (low, high, stroke) = (fixed(low * 1e6, 3), fixed(high * 1e6, 3), reach.stroke * 1e6);
     Some(Diagnostic::at(&model.spans, &[&format!("sensor.range[{item}]"), "sensor.range", "sensor"], code,
         format!(
-            "the gauge of a leg reads {} um to {} um, but the leg moves from 0 to {:.3} um",
-            fixed(low * 1e6, 3),
-            fixed(high * 1e6, 3),
-            reach.stroke * 1e6
+            "the gauge of a leg reads {low} um to {high} um, but the leg moves from 0 to {stroke:.3} um"
         ),
         "a leg beyond the range of its gauge is a gauge fault: keep set-points within the range, or use a gauge that covers the whole stroke; check the unit of `sensor.range`".to_owned(),
     ))
@@ -111,11 +109,8 @@ fn of_bias(model: &Model, reach: &Reach, bias: &PathReach) -> Option<Diagnostic>
     if low >= room && high <= reach.stroke - room {
         return None;
     }
-    let message = format!(
-        "at the bias a leg is at {:.3} um of {:.3} um: there is no room for corrections",
-        if low < room { low * 1e6 } else { high * 1e6 },
-        reach.stroke * 1e6
-    );
+    let (place, stroke) = (if low < room { low * 1e6 } else { high * 1e6 }, reach.stroke * 1e6);
+    let message = format!("at the bias a leg is at {place:.3} um of {stroke:.3} um: there is no room for corrections");
     let middle = 0.5 * (reach.axes[2].from_middle[0] + reach.axes[2].from_middle[1]);
     let help = format!("move the bias towards the middle of the strokes, where z is {:.1} um", middle * 1e6);
     Some(Diagnostic::at(&model.spans, &KEYS, codes::NO_ROOM, message, help))
@@ -155,16 +150,13 @@ fn of_axis(model: &Model, stroke: f64, axis: usize, declared: f64, [low, high]: 
         let binds = format!("the stroke is {} um", figure(stroke * 1e6));
         (codes::WORKSPACE_UNREACHABLE, binds, "use legs with more stroke")
     };
+    let (axis, declared, low, high) = (AXES[axis], declared * scale, fixed(low * scale, 2), fixed(high * scale, 2));
     Some(Diagnostic::at(
         &model.spans,
         &[&key, table, "workspace"],
         code,
         format!(
-            "no pose reaches |{}| = {:.2} {unit}: {binds}, and from its middle this axis alone moves from {} to {} {unit}",
-            AXES[axis],
-            declared * scale,
-            fixed(low * scale, 2),
-            fixed(high * scale, 2)
+            "no pose reaches |{axis}| = {declared:.2} {unit}: {binds}, and from its middle this axis alone moves from {low} to {high} {unit}"
         ),
         format!("{most}; check the unit, or {way_out}"),
     ))
@@ -172,11 +164,8 @@ fn of_axis(model: &Model, stroke: f64, axis: usize, declared: f64, [low, high]: 
 
 /// Explains that the identified table limits the travel, not the declared stroke.
 fn of_table(model: &Model, stroke: f64) -> String {
-    format!(
-        "the identified hysteresis ends at {} um, before the stroke of {} um (`actuator.stroke`)",
-        figure(stroke * 1e6),
-        figure(model.actuator.stroke * 1e6)
-    )
+    let [end, stroke] = [stroke * 1e6, model.actuator.stroke * 1e6].map(figure);
+    format!("the identified hysteresis ends at {end} um, before the stroke of {stroke} um (`actuator.stroke`)")
 }
 
 /// The finding about a path that is out of reach.
@@ -184,12 +173,10 @@ pub(super) fn of_path(model: &Model, stroke: f64, [key, name]: [&str; 2], path: 
     if path.poses == 0 || !beyond(stroke, path.displacement) {
         return None;
     }
+    let (lowest, highest, end) = (path.displacement[0] * 1e6, path.displacement[1] * 1e6, stroke * 1e6);
+    let why = if stroke < model.actuator.stroke { format!(": {}", of_table(model, stroke)) } else { String::new() };
     let message = format!(
-        "`{name}` needs leg displacements from {:.3} um to {:.3} um, but the legs move between 0 and {:.3} um{}",
-        path.displacement[0] * 1e6,
-        path.displacement[1] * 1e6,
-        stroke * 1e6,
-        if stroke < model.actuator.stroke { format!(": {}", of_table(model, stroke)) } else { String::new() }
+        "`{name}` needs leg displacements from {lowest:.3} um to {highest:.3} um, but the legs move between 0 and {end:.3} um{why}"
     );
     let section = key.split('.').next().unwrap_or(key);
     Some(Diagnostic::at(
@@ -226,32 +213,26 @@ pub fn describe(reach: &Reach, biased: bool) -> String {
     let tenths = |value: f64| libm::round(value * 10.0) / 10.0 + 0.0;
     let mut text = String::new();
     // Writing to a String cannot fail.
+    let (stroke, from) = (reach.stroke * 1e6, if biased { "the bias" } else { "rest" });
     let _ = writeln!(
         text,
-        "  reach of one axis alone, um and urad ({:.1} um legs): from the middle of the strokes | from {}",
-        reach.stroke * 1e6,
-        if biased { "the bias" } else { "rest" }
+        "  reach of one axis alone, um and urad ({stroke:.1} um legs): from the middle of the strokes | from {from}"
     );
     for (axis, one) in reach.axes.iter().enumerate() {
         let scale = unit(axis).1;
+        let (axis, low, high) = (AXES[axis], tenths(one.from_middle[0] * scale), tenths(one.from_middle[1] * scale));
+        let (from, to) = (tenths(one.from_bias[0] * scale), tenths(one.from_bias[1] * scale));
+        let declared = one.declared * scale;
         let _ = writeln!(
             text,
-            "    {:<3} {:>9.1} to {:>8.1} | {:>9.1} to {:>8.1}   (declared ±{:.1})",
-            AXES[axis],
-            tenths(one.from_middle[0] * scale),
-            tenths(one.from_middle[1] * scale),
-            tenths(one.from_bias[0] * scale),
-            tenths(one.from_bias[1] * scale),
-            one.declared * scale
+            "    {axis:<3} {low:>9.1} to {high:>8.1} | {from:>9.1} to {to:>8.1}   (declared ±{declared:.1})"
         );
     }
     if biased {
+        let (lowest, highest, share) = (reach.at_bias[0] * 1e6, reach.at_bias[1] * 1e6, reach.share * 100.0);
         let _ = writeln!(
             text,
-            "  at the bias the legs are at {:.1} to {:.1} um; all corners of {:.1} % of the declared workspace around it are within reach",
-            reach.at_bias[0] * 1e6,
-            reach.at_bias[1] * 1e6,
-            reach.share * 100.0
+            "  at the bias the legs are at {lowest:.1} to {highest:.1} um; all corners of {share:.1} % of the declared workspace around it are within reach"
         );
     }
     let conditioning = &reach.conditioning;
@@ -270,15 +251,12 @@ pub fn describe(reach: &Reach, biased: bool) -> String {
     let [base, platform] = reach.joint_angles.map(|angle| angle * 1e3);
     let _ = writeln!(text, "  joints turn by up to {base:.3} mrad at the base and {platform:.3} mrad at the platform");
     let half = |half: &[f64]| half.iter().map(|width| format!("{:.1}", width * 1e6)).collect::<Vec<_>>().join("/");
+    let (z, declared) = (reach.boxes.centre[2] * 1e6, half(&reach.boxes.as_declared[..3]));
+    let (declared_turn, volume) = (half(&reach.boxes.as_declared[3..]), half(&reach.boxes.largest[..3]));
+    let (volume_turn, still) = (half(&reach.boxes.largest[3..]), half(&reach.boxes.without_rotation[..3]));
     let _ = writeln!(
         text,
-        "  largest box within reach about z = {:.1} um, all axes together, ± um and urad: {} and {} with the declared shape; {} and {} by volume; {} without rotation",
-        reach.boxes.centre[2] * 1e6,
-        half(&reach.boxes.as_declared[..3]),
-        half(&reach.boxes.as_declared[3..]),
-        half(&reach.boxes.largest[..3]),
-        half(&reach.boxes.largest[3..]),
-        half(&reach.boxes.without_rotation[..3])
+        "  largest box within reach about z = {z:.1} um, all axes together, ± um and urad: {declared} and {declared_turn} with the declared shape; {volume} and {volume_turn} by volume; {still} without rotation"
     );
     text
 }

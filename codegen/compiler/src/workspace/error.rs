@@ -6,9 +6,14 @@ use std::path::{Path, PathBuf};
 use specgen_language::outcome::Failure;
 
 /// Error of writing an output folder.
-#[derive(Debug)]
+#[derive(Debug, thiserror::Error)]
 pub enum WriteError {
     /// The folder holds files that specgen did not write, or that were changed since. Nothing was changed.
+    #[error(
+        "output folder `{}` contains files that specgen did not write or that were changed since: {}; \
+         nothing was written. Name another folder with -o, or move them away",
+        dir.display(), files.join(", ")
+    )]
     Occupied {
         /// The folder.
         dir: PathBuf,
@@ -16,11 +21,20 @@ pub enum WriteError {
         files: Vec<String>,
     },
     /// Something other than a folder has that name. Nothing was changed.
+    #[error(
+        "the output `{}` exists and is not a folder; nothing was written. Name a folder with -o, or move it away",
+        dir.display()
+    )]
     NotAFolder {
         /// The output path.
         dir: PathBuf,
     },
     /// Another run is writing to the folder or building in it. Nothing was changed.
+    #[error(
+        "output folder `{}` is in use by {owner}; nothing was written. \
+         Run again when it has finished, or name another folder with -o",
+        dir.display()
+    )]
     Busy {
         /// The folder.
         dir: PathBuf,
@@ -28,6 +42,9 @@ pub enum WriteError {
         owner: String,
     },
     /// An I/O error. Nothing was changed.
+    #[error(
+        "could not {action}: {source}; nothing was changed. Check permissions and free space, or name another folder with -o"
+    )]
     Io {
         /// The attempted action.
         action: String,
@@ -35,6 +52,11 @@ pub enum WriteError {
         source: io::Error,
     },
     /// An I/O error, and another one while undoing the changes.
+    #[error(
+        "could not {action}: {source}; restoring the previous files failed, too: `{}` contains files of two versions. \
+         Run again when that is fixed, or name another folder with -o",
+        dir.display()
+    )]
     HalfWritten {
         /// The folder.
         dir: PathBuf,
@@ -50,43 +72,6 @@ impl WriteError {
         Self::Io { action: format!("{verb} `{}`", path.display()), source }
     }
 }
-
-impl std::fmt::Display for WriteError {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self {
-            Self::Occupied { dir, files } => write!(
-                f,
-                "output folder `{}` contains files that specgen did not write or that were changed since: {}; \
-                 nothing was written. Name another folder with -o, or move them away",
-                dir.display(),
-                files.join(", ")
-            ),
-            Self::NotAFolder { dir } => write!(
-                f,
-                "the output `{}` exists and is not a folder; nothing was written. Name a folder with -o, or move it away",
-                dir.display()
-            ),
-            Self::Busy { dir, owner } => write!(
-                f,
-                "output folder `{}` is in use by {owner}; nothing was written. \
-                 Run again when it has finished, or name another folder with -o",
-                dir.display()
-            ),
-            Self::Io { action, source } => write!(
-                f,
-                "could not {action}: {source}; nothing was changed. Check permissions and free space, or name another folder with -o"
-            ),
-            Self::HalfWritten { dir, action, source } => write!(
-                f,
-                "could not {action}: {source}; restoring the previous files failed, too: `{}` contains files of two versions. \
-                 Run again when that is fixed, or name another folder with -o",
-                dir.display()
-            ),
-        }
-    }
-}
-
-impl std::error::Error for WriteError {}
 
 impl From<WriteError> for Failure {
     fn from(error: WriteError) -> Self {

@@ -18,10 +18,9 @@ use specgen_language::diagnostic::{Diagnostic, Place, Severity};
 use specgen_language::model::{Model, RateDependence, TrajectoryKind};
 use specgen_language::spec::{self, SpecSource};
 
-mod cases;
 #[expect(dead_code, reason = "the cases are only read here")]
 #[path = "../../../../tests/src/cases.rs"]
-mod rules;
+mod cases;
 
 /// Specs below `specs/`: first one of each kind of controller, written in full; of the others only the differences.
 const SPECS: [&str; 19] = [
@@ -273,15 +272,12 @@ fn line(source: &SpecSource, finding: &Diagnostic) -> String {
 /// Errors and warnings.
 fn refusals() {
     let (mut golden, mut known) = (Golden::open("refusals.txt"), BTreeSet::new());
-    let (of_parts, of_paths) = (cases::OF_PARTS.iter(), cases::OF_PATHS.iter());
-    for (trajectories, (base, edits, table)) in of_parts.map(|case| (0, case)).chain(of_paths.map(|case| (1, case))) {
+    for (case, _) in cases::read(&root().join("tests/cases/changed_specs.txt")) {
+        let (base, edits) = (case.one('@').unwrap(), case.all('-').zip(case.all('+')).collect::<Vec<_>>());
         let source = read(base);
-        let changed = edits.iter().fold(with_trajectories(&source.text, trajectories), |text, (from, to)| {
-            assert!(text.contains(from), "{base}: no {from:?}");
-            text.replacen(from, to, 1)
-        });
-        let source = SpecSource { text: changed, ..source };
-        let rows = table.map(|row| cases::HEAD.to_owned() + &(0..=100).map(|k| row(k) + "\n").collect::<String>());
+        let text = case.edited(&with_trajectories(&source.text, usize::from(case.title == "paths")));
+        let source = SpecSource { text, ..source };
+        let rows = case.one('t').map(poses);
         golden.line(format!("# {base}: {edits:?}"));
         let mut findings = build(&source, rows.as_deref()).map_or_else(
             |found| found,
@@ -304,6 +300,23 @@ fn refusals() {
     golden.end();
 }
 
+/// A table of poses by its name: up and back in x and about y.
+fn poses(name: &str) -> String {
+    let row = |k: u32| {
+        let part = 0.5 * (1.0 - libm::cos(core::f64::consts::TAU * f64::from(k) / 100.0));
+        let wave = format!("{:.6},{:.6}", 3.0 * part, 40.0 * part);
+        match name {
+            "wave" => wave,
+            "one_lost" if k == 50 => "-90,0".to_owned(),
+            "one_lost" => wave,
+            "ramp" => format!("{:.3},0", 0.6 * f64::from(k)),
+            "steep" => format!("{:.3},0", 0.4 * f64::from(if k > 50 { 100 - k } else { k })),
+            _ => panic!("no table {name}"),
+        }
+    };
+    "x_um,theta_y_urad\n".to_owned() + &(0..=100).map(|k| row(k) + "\n").collect::<String>()
+}
+
 /// The text with only the first `count` trajectories.
 fn with_trajectories(text: &str, count: usize) -> String {
     const BEGIN: &str = "[[trajectory]]";
@@ -317,7 +330,7 @@ fn with_trajectories(text: &str, count: usize) -> String {
 /// Findings of the physical lint at the boundary of each rule.
 fn boundaries() {
     let mut golden = Golden::open("boundaries.txt");
-    for (rule, _) in rules::read(&root().join("tests/cases/lint_boundaries.txt")) {
+    for (rule, _) in cases::read(&root().join("tests/cases/lint_boundaries.txt")) {
         let base = rule.one('@').unwrap_or("reference.toml");
         let source = read(base);
         let (olds, news): (Vec<&str>, Vec<&str>) = (rule.all('-').collect(), rule.all('+').collect());

@@ -270,17 +270,14 @@ impl StoredDesign {
             format!("[{}]", values.join(", "))
         };
         let sections: Vec<String> = self.sections.iter().map(|section| format!("  {},\n", array(section))).collect();
+        let (digest, sections, notch) = (&self.digest, sections.concat(), array(&self.notch_damping));
+        let proportional = with_units(self.proportional, "N/m", "N m/rad");
+        let (integral, level) = (with_units(self.integral, "N/(m s)", "N m/(rad s)"), self.level_bandwidth);
+        let drift = self.drift_bandwidth;
         format!(
-            "[control.design]\ndigest          = \"{}\"\nsections        = [\n{}]\nnotch_damping   = {}\n\
-             proportional    = {}\nintegral        = {}\nlevel_bandwidth = \"{:?} rad/s\"\n\
-             drift_bandwidth = \"{:?} rad/s\"\n",
-            self.digest,
-            sections.concat(),
-            array(&self.notch_damping),
-            with_units(self.proportional, "N/m", "N m/rad"),
-            with_units(self.integral, "N/(m s)", "N m/(rad s)"),
-            self.level_bandwidth,
-            self.drift_bandwidth
+            "[control.design]\ndigest          = \"{digest}\"\nsections        = [\n{sections}]\nnotch_damping   = {notch}\n\
+             proportional    = {proportional}\nintegral        = {integral}\nlevel_bandwidth = \"{level:?} rad/s\"\n\
+             drift_bandwidth = \"{drift:?} rad/s\"\n"
         )
     }
 }

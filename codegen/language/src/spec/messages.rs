@@ -106,11 +106,8 @@ fn without_commas(found: &str) -> String {
     let written = |text: &str| format!("\"{}\"", text::shorten(text));
     match (decimals, thousands) {
         (Some(one), Some(other)) => {
-            format!(
-                "write {} if the comma is a decimal comma, {} if it separates thousands",
-                written(&one),
-                written(&other)
-            )
+            let (first, second) = (written(&one), written(&other));
+            format!("write {first} if the comma is a decimal comma, {second} if it separates thousands")
         }
         (Some(one), None) => format!("write the decimals after a point: {}", written(&one)),
         (None, Some(one)) => format!("write no commas between thousands: {}", written(&one)),

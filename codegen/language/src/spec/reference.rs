@@ -48,17 +48,9 @@ pub fn reference_markdown() -> String {
             section.doc
         );
         for key in section.keys {
-            let _ = writeln!(
-                text,
-                "| `{}` | {} | {} | {} | {}{}{} |",
-                key.name,
-                form(key),
-                range(key),
-                absence(key),
-                symbol(key),
-                key.doc,
-                aliases(key)
-            );
+            let (name, form, range, absence, symbol) = (&key.name, form(key), range(key), absence(key), symbol(key));
+            let (doc, aliases) = (key.doc, aliases(key));
+            let _ = writeln!(text, "| `{name}` | {form} | {range} | {absence} | {symbol}{doc}{aliases} |");
         }
     }
     text
@@ -68,14 +60,8 @@ pub fn reference_markdown() -> String {
 #[must_use]
 pub fn key_markdown(path: &str, key: &Key) -> String {
     let symbol = if key.symbol.is_empty() { String::new() } else { format!(", {} in the paper", key.symbol) };
-    format!(
-        "`{path}`{symbol}\n\n{}{}\n\n- example: {}\n- range: {}\n- if left out: {}\n",
-        key.doc,
-        aliases(key),
-        form(key),
-        range(key),
-        absence(key)
-    )
+    let (doc, aliases, form, range, absence) = (key.doc, aliases(key), form(key), range(key), absence(key));
+    format!("`{path}`{symbol}\n\n{doc}{aliases}\n\n- example: {form}\n- range: {range}\n- if left out: {absence}\n")
 }
 
 fn form(key: &Key) -> String {

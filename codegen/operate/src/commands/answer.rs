@@ -74,15 +74,11 @@ impl Outcome for MachineStatus {
             }
             Some(_) => String::new(),
         };
+        let (tick, time, state, status) = (self.tick, self.tick as f64 * self.period, &self.state, self.status);
+        let (words, late) = (if self.status_in_words.is_empty() { "-" } else { &self.status_in_words }, self.late);
+        let damaged = self.link_errors + self.damaged_frames;
         format!(
-            "tick {}, {:.4} s: {}, amplifiers {on}; status {:#x}: {}\n{age}  {} late ticks, {} damaged frames\n",
-            self.tick,
-            self.tick as f64 * self.period,
-            self.state,
-            self.status,
-            if self.status_in_words.is_empty() { "-" } else { &self.status_in_words },
-            self.late,
-            self.link_errors + self.damaged_frames
+            "tick {tick}, {time:.4} s: {state}, amplifiers {on}; status {status:#x}: {words}\n{age}  {late} late ticks, {damaged} damaged frames\n"
         )
     }
 }
@@ -149,11 +145,9 @@ impl Outcome for RecorderState {
             (false, true) => "is complete",
             (false, false) => "is stopped",
         };
+        let (ticks, seconds, capacity) = (self.ticks, f64::from(self.ticks) * self.period, self.capacity);
         format!(
-            "the recorder {does}; it holds {} ticks, {:.4} s; its capacity is at least {} ticks\n",
-            self.ticks,
-            f64::from(self.ticks) * self.period,
-            self.capacity
+            "the recorder {does}; it holds {ticks} ticks, {seconds:.4} s; its capacity is at least {capacity} ticks\n"
         )
     }
 }

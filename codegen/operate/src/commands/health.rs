@@ -103,9 +103,7 @@ impl HealthReport {
             "  since power-up: {overruns}, {} converter faults, {} ticks with an implausible gauge",
             self.converter_faults, self.gauge_faults
         );
-        for kind in &self.converter_faults_in_words {
-            let _ = writeln!(text, "    converter: {kind}");
-        }
+        text.extend(self.converter_faults_in_words.iter().map(|kind| format!("    converter: {kind}\n")));
         if let Some([used, total]) = self.stack_bytes {
             let _ = writeln!(text, "  stack: peak {used} of {total} bytes");
         }

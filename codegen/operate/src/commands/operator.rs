@@ -410,11 +410,9 @@ impl<P: Port> Operator<P> {
                 WaitCondition::Passed(_) => "",
             };
             if !expected.is_empty() && start.elapsed() >= limit {
+                let (state, seconds) = (self.state(), limit.as_secs_f64());
                 return Err(SessionError::Fault(format!(
-                    "the machine is still {} after {} s, expected {}",
-                    self.state(),
-                    limit.as_secs_f64(),
-                    expected
+                    "the machine is still {state} after {seconds} s, expected {expected}"
                 )));
             }
             std::thread::sleep(self.session.due());

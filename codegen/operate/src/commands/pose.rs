@@ -9,18 +9,14 @@ pub const ZERO: &str = "zero";
 /// The exceeded limit as text.
 pub fn in_words(binding: &Binding) -> String {
     match *binding {
-        Binding::Axis { axis, at, bound } => format!(
-            "{} would be at {} from rest, outside the workspace of +-{}",
-            AXES[axis],
-            amount(axis, at),
-            amount(axis, bound)
-        ),
-        Binding::Leg { leg, at, range: [low, high] } => format!(
-            "leg {leg} would be {} from rest, outside its range of {} to {}",
-            amount(0, at),
-            amount(0, low),
-            amount(0, high)
-        ),
+        Binding::Axis { axis, at, bound } => {
+            let (name, place, limit) = (AXES[axis], amount(axis, at), amount(axis, bound));
+            format!("{name} would be at {place} from rest, outside the workspace of +-{limit}")
+        }
+        Binding::Leg { leg, at, range: [low, high] } => {
+            let (place, lowest, highest) = (amount(0, at), amount(0, low), amount(0, high));
+            format!("leg {leg} would be {place} from rest, outside its range of {lowest} to {highest}")
+        }
     }
 }
 

@@ -32,13 +32,10 @@ impl<P: Port> Operator<P> {
         let (ours, theirs) = (&compiled.ir, self.session.description());
         let words = &compiled.ir.integrity.settings;
         if ours.scalar.bits() != theirs.scalar.bits() || words.len() != theirs.config_names.len() {
+            let (path, own, own_bits) = (path.display(), words.len(), ours.scalar.bits());
+            let (others, other_bits) = (theirs.config_names.len(), theirs.scalar.bits());
             return Err(SessionError::Refused(format!(
-                "{} has {} settings in f{}, the device has {} in f{}: the spec must have the same kind and scalar as the device's",
-                path.display(),
-                words.len(),
-                ours.scalar.bits(),
-                theirs.config_names.len(),
-                theirs.scalar.bits()
+                "{path} has {own} settings in f{own_bits}, the device has {others} in f{other_bits}: the spec must have the same kind and scalar as the device's"
             )));
         }
         let of = path.display();

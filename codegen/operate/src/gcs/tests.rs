@@ -218,12 +218,10 @@ impl Bench {
         intervals.dedup();
         let all = start.elapsed().as_nanos() / ASKED.as_nanos();
         intervals.retain(|interval| *interval < all);
+        let (median, longest, polled) = (times[5].as_secs_f64() * 1e3, times[9].as_secs_f64() * 1e3, intervals.len());
+        let milliseconds = ASKED.as_millis();
         println!(
-            "gcs, {what}: stops answered after {:.1} ms (median of 10), {:.1} ms (longest); machine polled in {} of {all} intervals of {} ms",
-            times[5].as_secs_f64() * 1e3,
-            times[9].as_secs_f64() * 1e3,
-            intervals.len(),
-            ASKED.as_millis(),
+            "gcs, {what}: stops answered after {median:.1} ms (median of 10), {longest:.1} ms (longest); machine polled in {polled} of {all} intervals of {milliseconds} ms"
         );
         assert!(times[5] <= STOPS, "{what}: {times:?}");
         assert!(intervals.len() as u128 * 4 >= all * 3, "{what}: {} of {all}", intervals.len());

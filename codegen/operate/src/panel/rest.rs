@@ -64,11 +64,9 @@ impl RestError {
             return said("ok", "Running. Nothing to do.".to_owned(), "");
         };
         let unit = if axis < 3 { "nm" } else { "nrad" };
+        let (name, noise, most) = (AXES[axis], rms[axis] * 1e9, limit * 1e9);
         let what = format!(
-            "Running. The error of {} is {:.1}\u{2009}{unit} rms, more than the {:.1}\u{2009}{unit} of {key}.",
-            AXES[axis],
-            rms[axis] * 1e9,
-            limit * 1e9
+            "Running. The error of {name} is {noise:.1}\u{2009}{unit} rms, more than the {most:.1}\u{2009}{unit} of {key}."
         );
         said("warning", what, "Check gains and load, and what shakes the platform.")
     }

@@ -104,17 +104,12 @@ impl<P: Port> Lockstep<P> {
         let OpenSession { client, identity, description: theirs, .. } = session::open(port, timeout)?;
         let ours = host.controller().description();
         if &theirs != ours {
+            let (name, digest, version, bits) = (&theirs.name, &theirs.digest, &theirs.version, theirs.scalar.bits());
+            let (own_name, own_digest, own_version) = (&ours.name, &ours.digest, &ours.version);
+            let own_bits = ours.scalar.bits();
             return Err(OpenError::Other(format!(
-                "the device runs the controller `{}` of spec digest {}, specgen {}, f{}; expected `{}` of {}, specgen {}, f{}: \
-                 build and flash it from this spec",
-                theirs.name,
-                theirs.digest,
-                theirs.version,
-                theirs.scalar.bits(),
-                ours.name,
-                ours.digest,
-                ours.version,
-                ours.scalar.bits(),
+                "the device runs the controller `{name}` of spec digest {digest}, specgen {version}, f{bits}; expected `{own_name}` of {own_digest}, specgen {own_version}, f{own_bits}: \
+                 build and flash it from this spec"
             )));
         }
         let config = host.controller().default_config();

@@ -133,12 +133,11 @@ impl Outcome for Report {
             let _ = writeln!(out, "{} damaged frames were requested again", self.damaged_frames);
         }
         let rate = self.rate();
+        let (factor, hertz) = (rate * self.interval, (1.0 / self.interval).round());
+        let share = 100.0 * self.waited.as_secs_f64() / if self.seconds > 0.0 { self.seconds } else { 1.0 };
         let _ = writeln!(
             out,
-            "{rate:.0} steps/s in closed loop, {:.2} × real time at {} Hz; {:.0} % of it waiting for the device",
-            rate * self.interval,
-            (1.0 / self.interval).round(),
-            100.0 * self.waited.as_secs_f64() / if self.seconds > 0.0 { self.seconds } else { 1.0 },
+            "{rate:.0} steps/s in closed loop, {factor:.2} × real time at {hertz} Hz; {share:.0} % of it waiting for the device"
         );
         out + self.plot.as_deref().unwrap_or_default()
     }

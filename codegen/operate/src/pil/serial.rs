@@ -1,7 +1,7 @@
 //! A serial line: raw bytes, no flow control, a timeout for every wait.
 
 use std::fs::{File, OpenOptions};
-use std::io::{self, ErrorKind, Read, Write};
+use std::io::{self, ErrorKind, Write};
 use std::os::unix::fs::OpenOptionsExt;
 use std::path::Path;
 use std::time::Duration;
@@ -11,7 +11,7 @@ use rustix::fs::OFlags;
 use rustix::termios::{ControlModes, OptionalActions, QueueSelector, ioctl_tiocexcl, tcflush, tcgetattr, tcsetattr};
 use specgen_link::client::Port;
 
-use super::wait::ready;
+use super::wait::{ready, receive};
 
 /// Default baud rate. A board's USB serial port ignores it.
 pub const BAUD: u32 = 921_600;
@@ -86,17 +86,6 @@ impl Port for SerialLine {
     }
 
     fn receive(&mut self, buffer: &mut [u8], limit: Duration) -> io::Result<usize> {
-        if !ready(&self.file, PollFlags::IN, limit)? {
-            return Ok(0);
-        }
-        let gone = || io::Error::new(ErrorKind::UnexpectedEof, "the serial device is gone; was it unplugged?");
-        match self.file.read(buffer) {
-            Ok(0) => Err(gone()),
-            Ok(count) => Ok(count),
-            Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::Interrupted) => Ok(0),
-            // EIO: the other end is closed.
-            Err(error) if error.raw_os_error() == Some(rustix::io::Errno::IO.raw_os_error()) => Err(gone()),
-            Err(error) => Err(error),
-        }
+        receive(&mut self.file, buffer, limit, "the serial device is gone; was it unplugged?")
     }
 }

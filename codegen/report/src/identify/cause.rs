@@ -11,11 +11,9 @@ pub(super) fn account(cause: &Cause) -> String {
         (identify::Source::Hum, Some(frequency)) => format!(" at {frequency:.1} Hz"),
         _ => String::new(),
     };
+    let (main, shares, drift) = (cause.main.name(), shares.join(", "), cause.drift_rms * 1e9);
     format!(
-        "mainly {}{which} (shares of the mean square: {}); a linear drift of {:.2} nm rms was removed before",
-        cause.main.name(),
-        shares.join(", "),
-        cause.drift_rms * 1e9
+        "mainly {main}{which} (shares of the mean square: {shares}); a linear drift of {drift:.2} nm rms was removed before"
     )
 }
 

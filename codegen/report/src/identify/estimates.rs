@@ -51,21 +51,14 @@ impl Outcome for IdentificationResult<Estimate<AxialStiffness>> {
             || "no creep found".to_owned(),
             |t| format!("creep of {:.2} % with {t:.3} s removed", report.creep_percent),
         );
+        let (k, error, drift) = (report.stiffness * 1e-6, report.error * 1e-6, report.drift * 1e9);
+        let (uncorrected, samples, independent) = (report.uncorrected * 1e-6, report.samples, report.independent);
+        let (low, high, rms) = (report.force[0], report.force[1], report.residual_rms * 1e9);
+        let (value, measured) = (report.stiffness, measured.text());
         format!(
-            "{record}: k = {:.4} ± {:.4} N/µm (standard error); {creep}, drift {:.3} nm/s; without these corrections {:.4} N/µm\n  \
-             {} samples ({:.0} independent), force {:.3} N to {:.3} N, residual {:.3} nm rms\nspec lines:\n[actuator]\n\
-             axial_stiffness = \"{:.4e} N/m\"\n{}{files}",
-            report.stiffness * 1e-6,
-            report.error * 1e-6,
-            report.drift * 1e9,
-            report.uncorrected * 1e-6,
-            report.samples,
-            report.independent,
-            report.force[0],
-            report.force[1],
-            report.residual_rms * 1e9,
-            report.stiffness,
-            measured.text()
+            "{record}: k = {k:.4} ± {error:.4} N/µm (standard error); {creep}, drift {drift:.3} nm/s; without these corrections {uncorrected:.4} N/µm\n  \
+             {samples} samples ({independent:.0} independent), force {low:.3} N to {high:.3} N, residual {rms:.3} nm rms\nspec lines:\n[actuator]\n\
+             axial_stiffness = \"{value:.4e} N/m\"\n{measured}{files}"
         )
     }
 }
@@ -86,41 +79,29 @@ impl Outcome for IdentificationResult<Estimate<FrequencyResponse>> {
         let Self { report: Estimate { record, value: report, .. }, measured, files } = self;
         let f = &report.fitted;
         let shown_in = |e: Parameter, scale: f64| format!("{:.4} ± {:.1e}", e.value * scale, e.error * scale);
+        let (segments, segment, rate) = (report.segments, report.segment, report.rate);
+        let (resolution, low, high) = (report.resolution, report.band[0], report.band[1]);
+        let (coherence, misfit) = (report.coherence, report.misfit_percent);
         let mut text = format!(
-            "{record}: {} segments of {} samples at {:.1} Hz, bins of {:.3} Hz, used {:.3} to {:.1} Hz, coherence {:.4} in the middle, misfit {:.2} %\n",
-            report.segments,
-            report.segment,
-            report.rate,
-            report.resolution,
-            report.band[0],
-            report.band[1],
-            report.coherence,
-            report.misfit_percent
+            "{record}: {segments} segments of {segment} samples at {rate:.1} Hz, bins of {resolution:.3} Hz, used {low:.3} to {high:.1} Hz, coherence {coherence:.4} in the middle, misfit {misfit:.2} %\n"
         );
         // Writing to a String cannot fail.
+        let (resonance, damping) = (shown_in(f.resonance, 1.0), shown_in(f.damping_ratio, 1.0));
+        let (lag, dead_time) = (shown_in(f.lag, 1e3), shown_in(f.dead_time, 1e3));
+        let (sum, correlation) = (shown_in(f.lag_and_dead_time, 1e3), f.lag_dead_time_correlation);
+        let (gain, error) = (f.gain.value * 1e6, f.gain.error * 1e6);
         let _ = write!(
             text,
-            "  resonance     {} Hz\n  damping ratio {}\n  lag           {} ms\n  dead time     {} ms (including half a period of converter hold)\n  lag + dead    {} ms (errors of the two correlated by {:.2})\n  static gain   {:.6} ± {:.1e} µm/V\n",
-            shown_in(f.resonance, 1.0),
-            shown_in(f.damping_ratio, 1.0),
-            shown_in(f.lag, 1e3),
-            shown_in(f.dead_time, 1e3),
-            shown_in(f.lag_and_dead_time, 1e3),
-            f.lag_dead_time_correlation,
-            f.gain.value * 1e6,
-            f.gain.error * 1e6,
+            "  resonance     {resonance} Hz\n  damping ratio {damping}\n  lag           {lag} ms\n  dead time     {dead_time} ms (including half a period of converter hold)\n  lag + dead    {sum} ms (errors of the two correlated by {correlation:.2})\n  static gain   {gain:.6} ± {error:.1e} µm/V\n"
         );
         // The lag attenuates what the resonance responds to.
         let lagging = std::f64::consts::TAU * f.resonance.value * f.lag.value;
+        let (resonance, damping) = (f.resonance.value, f.damping_ratio.value);
+        let (gain, lag) = (f.gain.value * 1e6 / (1.0 + lagging * lagging).sqrt(), f.lag.value * 1e3);
+        let (measured, mode) = (measured.text(), mode_lines(f.resonance.value, f.damping_ratio.value));
         let _ = write!(
             text,
-            "spec lines:\n[actuator]\nresonance = \"{:.1} Hz\"\ndamping_ratio = {:.4}\n# resonance_gain: {:.5} um/V, the gain of small motion behind the lag, over that of a large loop\n[amplifier]\nlag = \"{:.4} ms\"\n{}with [control], [actuator] applies to every leg; for this leg alone, write instead:\n{}{files}",
-            f.resonance.value,
-            f.damping_ratio.value,
-            f.gain.value * 1e6 / (1.0 + lagging * lagging).sqrt(),
-            f.lag.value * 1e3,
-            measured.text(),
-            mode_lines(f.resonance.value, f.damping_ratio.value),
+            "spec lines:\n[actuator]\nresonance = \"{resonance:.1} Hz\"\ndamping_ratio = {damping:.4}\n# resonance_gain: {gain:.5} um/V, the gain of small motion behind the lag, over that of a large loop\n[amplifier]\nlag = \"{lag:.4} ms\"\n{measured}with [control], [actuator] applies to every leg; for this leg alone, write instead:\n{mode}{files}"
         );
         text
     }
@@ -188,25 +169,15 @@ impl Outcome for Calibration {
             || "unknown: the reference has no reversal".to_owned(),
             |h| format!("{:.3} nm between the rising and falling branches", h * 1e9),
         );
+        let (record, samples, v_low) = (&self.report.record, report.samples, report.volts[0]);
+        let (v_high, low, high) = (report.volts[1], report.reference[0] * 1e6, report.reference[1] * 1e6);
+        let (errors, degree, rms) = (errors.join(", "), report.degree, report.residual_rms * 1e9);
+        let (most, at, slope) = (report.residual_max * 1e9, &report.residual_max_at, report.least_slope_percent);
+        let (calibration, measured, files) = (&self.calibration, self.measured.text(), &self.files);
         format!(
-            "{}: {} samples, {:.4} V to {:.4} V, {:.4} µm to {:.4} µm\n  held-out error by degree: {}\n  degree {} ({chosen})\n  \
-             residual {:.3} nm rms, at most {:.3} nm (at {})\n  hysteresis {hysteresis}\n  monotonic over these voltages: smallest slope {:.1} % \
-             of the mean slope\nspec lines, in [sensor] for all gauges or in [[gauge]] for this one:\n{}\n{}{}",
-            self.report.record,
-            report.samples,
-            report.volts[0],
-            report.volts[1],
-            report.reference[0] * 1e6,
-            report.reference[1] * 1e6,
-            errors.join(", "),
-            report.degree,
-            report.residual_rms * 1e9,
-            report.residual_max * 1e9,
-            report.residual_max_at,
-            report.least_slope_percent,
-            self.calibration,
-            self.measured.text(),
-            self.files
+            "{record}: {samples} samples, {v_low:.4} V to {v_high:.4} V, {low:.4} µm to {high:.4} µm\n  held-out error by degree: {errors}\n  degree {degree} ({chosen})\n  \
+             residual {rms:.3} nm rms, at most {most:.3} nm (at {at})\n  hysteresis {hysteresis}\n  monotonic over these voltages: smallest slope {slope:.1} % \
+             of the mean slope\nspec lines, in [sensor] for all gauges or in [[gauge]] for this one:\n{calibration}\n{measured}{files}"
         )
     }
 }

@@ -189,11 +189,10 @@ fn details(report: &Report, text: &mut String) {
     let _ = writeln!(text, "  residual: {}", account(&report.cause));
     let _ = writeln!(text, "  dead time {}", report.dead_time_basis);
     if report.dead_time > report.held && report.held > 0.0 {
+        let (held, rest) = (report.held * 1e3, (report.dead_time - report.held) * 1e3);
         let _ = writeln!(
             text,
-            "  of this, {:.3} ms is the hold of a command, since `drive_V` is a command; relative to the voltage it is {:.3} ms (name a measured voltage `monitor_V`)",
-            report.held * 1e3,
-            (report.dead_time - report.held) * 1e3
+            "  of this, {held:.3} ms is the hold of a command, since `drive_V` is a command; relative to the voltage it is {rest:.3} ms (name a measured voltage `monitor_V`)"
         );
     }
     if report.weightless > 0 {
@@ -203,15 +202,11 @@ fn details(report: &Report, text: &mut String) {
         let _ = writeln!(text, "  every cell of the plane was excited");
     }
     for region in report.unexcited.iter().take(5) {
+        let (cells, share, up_low, up_high) = (region.cells, region.share * 100.0, region.up[0], region.up[1]);
+        let (down_low, down_high) = (region.down[0], region.down[1]);
         let _ = writeln!(
             text,
-            "  not excited: {} cells ({:.1} %), up_threshold {:.3} to {:.3} V, down_threshold {:.3} to {:.3} V; there the measured sum is distributed evenly",
-            region.cells,
-            region.share * 100.0,
-            region.up[0],
-            region.up[1],
-            region.down[0],
-            region.down[1]
+            "  not excited: {cells} cells ({share:.1} %), up_threshold {up_low:.3} to {up_high:.3} V, down_threshold {down_low:.3} to {down_high:.3} V; there the measured sum is distributed evenly"
         );
     }
 }

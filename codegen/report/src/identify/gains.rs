@@ -1,16 +1,16 @@
 //! `specgen identify gains`: a recorded run of a platform in; the gain of each leg relative to its table, and six separate tables out.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use serde::Serialize;
 
-use super::recorded_run::{records, replayed};
+use super::recorded_run::{records, records_line, replayed, within, write_tables};
 use super::{MeasuredKeys, refused};
 use specgen_compiler::spec_file;
 use specgen_identify::gains::{self, LegGain};
-use specgen_identify::{marked_as_simulated, write_table_csv};
+use specgen_identify::write_table_csv;
 use specgen_language::outcome::{Failure, Outcome};
-use specgen_language::output::{check_input, write_folder};
+use specgen_language::output::check_input;
 use specgen_language::table::{right, row};
 use specgen_language::ui::Ui;
 
@@ -23,10 +23,10 @@ const PLAUSIBLE: std::ops::RangeInclusive<f64> = 0.5..=2.0;
 ///
 /// # Errors
 /// A file cannot be read or written, or its data are unsuitable.
-pub fn run(recording: &Path, spec: &Path, output: Option<&str>, ui: &mut Ui) -> Result<(), Failure> {
+pub fn run(recording: &Path, spec: &Path, output: Option<&Path>, ui: &mut Ui) -> Result<(), Failure> {
     let shown = recording.display().to_string();
     let refuse = |error: &dyn std::fmt::Display| Failure::Gate(format!("{shown}: {error}"));
-    let folder = output.map(|name| folder(spec, name)).transpose()?;
+    let folder = output.map(|folder| within(spec, folder).map(|name| (name, folder))).transpose()?;
     check_input(recording)?;
     let compiled = spec_file::looked_up(spec, ui)?;
     let model = &compiled.model;
@@ -40,24 +40,18 @@ pub fn run(recording: &Path, spec: &Path, output: Option<&str>, ui: &mut Ui) -> 
         let Some(mut own) = tables.leg(model, leg) else { continue };
         own.inertia = None;
         own.dead_time = model.amplifier.lag;
-        let name = format!("{shown}, leg {}", leg + 1);
+        let name = format!("{shown}, leg {leg}");
         let gain = gains::of(&own, &moves.times, voltage, displacement, &name).map_err(refused)?;
         let gain = gain.filter(|found| found.error <= LARGEST_ERROR && PLAUSIBLE.contains(&found.gain));
         legs.push((own.still, gain.ok_or_else(|| refuse(&poor(leg, gain)))?));
     }
-    let mut files = String::new();
-    if let Some(folder) = &folder {
-        let tables = legs.iter().enumerate().map(|(leg, (table, found))| {
-            let text = write_table_csv(&gains::scaled(table, found.gain));
-            // The shape comes from the spec's record, which may be simulated.
-            let text = if simulated { marked_as_simulated(&text) } else { text };
-            (format!("leg{}.csv", leg + 1), text.into_bytes())
-        });
-        write_folder(folder, &tables.collect::<Vec<_>>())?;
-        files = format!("wrote 6 tables to {}\n", folder.display());
+    let (mut files, mut records) = (String::new(), String::new());
+    if let Some((name, folder)) = folder {
+        let tables = legs.iter().map(|(table, found)| write_table_csv(&gains::scaled(table, found.gain))).collect();
+        files = write_tables(folder, tables, simulated)?;
+        records = records_line(&name);
     }
     let legs = legs.into_iter().map(|(_, found)| found).collect();
-    let records = output.map(line).unwrap_or_default();
     let measured = MeasuredKeys::of(&["hysteresis.records"], simulated);
     ui.result(&Gains { recording: shown, seconds: moves.seconds(), legs, measured, records, files });
     Ok(())
@@ -70,27 +64,9 @@ fn poor(leg: usize, found: Option<LegGain>) -> String {
         |found| format!("has the gain {:.3} ± {:.3}", found.gain, found.error),
     );
     format!(
-        "leg {} of 1 to 6 {what}: record at least a second of a slow wave on all axes, as large as the workspace permits, in closed loop \
-         and without contact",
-        leg + 1
+        "leg {leg} {what}: record at least a second of a slow wave on all axes, as large as the workspace permits, in closed loop \
+         and without contact"
     )
-}
-
-/// The folder `name` beside `spec`.
-fn folder(spec: &Path, name: &str) -> Result<PathBuf, Failure> {
-    let within = Path::new(name).components().all(|part| matches!(part, std::path::Component::Normal(_)));
-    if name.is_empty() || !within || name.contains('\\') {
-        let message =
-            format!("-o `{name}`: expected a folder relative to the spec's, such as `gains`, with forward slashes");
-        return Err(Failure::Usage(message));
-    }
-    Ok(spec.parent().unwrap_or(Path::new("")).join(name))
-}
-
-/// The spec line with the tables.
-fn line(folder: &str) -> String {
-    let names: Vec<String> = (1..=6).map(|leg| format!("\"{}/leg{leg}.csv\"", folder.trim_end_matches('/'))).collect();
-    format!("records = [{}]", names.join(", "))
 }
 
 /// Identified gains.
@@ -112,22 +88,14 @@ struct Gains {
 impl Outcome for Gains {
     fn text(&self) -> String {
         let mut text =
-            format!("{}: gains of legs 1 to 6 relative to their tables, from {:.3} s\n", self.recording, self.seconds);
+            format!("{}: gains of legs 0 to 5 relative to their tables, from {:.3} s\n", self.recording, self.seconds);
         let columns = [5, 9, 11, 11, 13, 15].map(|width| right(width).behind(" "));
         row(&mut text, &columns, &[&"leg", &"lambda", &"± std err", &"travel µm", &"error nm rms", &"with λ = 1"]);
         for (leg, found) in self.legs.iter().enumerate() {
-            row(
-                &mut text,
-                &columns,
-                &[
-                    &(leg + 1),
-                    &format_args!("{:.4}", found.gain),
-                    &format_args!("{:.4}", found.error),
-                    &format_args!("{:.3}", found.travel * 1e6),
-                    &format_args!("{:.1}", found.residual_rms * 1e9),
-                    &format_args!("{:.1}", found.residual_before * 1e9),
-                ],
-            );
+            let [gain, error] = [found.gain, found.error].map(|value| format!("{value:.4}"));
+            let [after, before] = [found.residual_rms, found.residual_before].map(|rms| format!("{:.1}", rms * 1e9));
+            let travel = format!("{:.3}", found.travel * 1e6);
+            row(&mut text, &columns, &[&leg, &gain, &error, &travel, &after, &before]);
         }
         if !self.records.is_empty() {
             text += &format!("lines for the spec:\n[hysteresis]\n{}\n{}", self.records, self.measured.text());

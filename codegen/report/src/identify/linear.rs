@@ -128,48 +128,34 @@ fn table(report: &LinearReport) -> String {
         &[&"frequency Hz", &"ρ µm/V", &"± std err", &"δ µm", &"loop µm", &"%", &"correlation", &"cycles", &"record"],
     );
     for r in &report.relations {
+        let [gain, error] = [r.gain, r.gain_error].map(|value| format!("{:.6}", value * 1e6));
+        let [offset, width] = [r.offset, r.loop_width].map(|value| format!("{:.4}", value * 1e6));
+        let (hertz, percent) = (format!("{:.4}", r.frequency), format!("{:.1}", r.loop_percent));
+        let correlation = format!("{:.5}", r.correlation);
         row(
             &mut text,
             &columns,
-            &[
-                &format_args!("{:.4}", r.frequency),
-                &format_args!("{:.6}", r.gain * 1e6),
-                &format_args!("{:.6}", r.gain_error * 1e6),
-                &format_args!("{:.4}", r.offset * 1e6),
-                &format_args!("{:.4}", r.loop_width * 1e6),
-                &format_args!("{:.1}", r.loop_percent),
-                &format_args!("{:.5}", r.correlation),
-                &r.cycles,
-                &r.record,
-            ],
+            &[&hertz, &gain, &error, &offset, &width, &percent, &correlation, &r.cycles, &r.record],
         );
     }
     // Writing to a String cannot fail, here and below.
+    let (gain, frequency, low) = (report.reference_gain * 1e6, report.reference_frequency, report.gain_ratio[0]);
+    let high = report.gain_ratio[1];
     let _ = writeln!(
         text,
-        "reference: ρ̂ = {:.6} µm/V, at {:.4} Hz; λ = ρ/ρ̂ from {:.4} to {:.4} (including two standard errors)",
-        report.reference_gain * 1e6,
-        report.reference_frequency,
-        report.gain_ratio[0],
-        report.gain_ratio[1]
+        "reference: ρ̂ = {gain:.6} µm/V, at {frequency:.4} Hz; λ = ρ/ρ̂ from {low:.4} to {high:.4} (including two standard errors)"
     );
     text
 }
 
 fn static_verdict(report: &LinearReport, text: &mut String) {
     let yes = |stable: bool| if stable { "stable" } else { "not stable" };
+    let (ewma_limit, level, ewma) = (report.largest_ewma_weight, PAPER[0], yes(report.ewma_is_stable(PAPER[0])));
+    let (pcc_limit, drift, pcc) = (report.largest_pcc_weight, PAPER[1], yes(report.pcc_is_stable(PAPER[0], PAPER[1])));
     let _ = writeln!(
         text,
-        "for a leg without dynamics: EWMA (AII.18, corrected to 0 < λω < 2) up to ω = {:.4}, ω = {} is {}; \
-         PCC (AII.19) up to ω1 = {:.4} with ω2 = {:.4} ω1, ω1 = {}, ω2 = {} is {}",
-        report.largest_ewma_weight,
-        PAPER[0],
-        yes(report.ewma_is_stable(PAPER[0])),
-        report.largest_pcc_weight,
-        PAPER_PROPORTION,
-        PAPER[0],
-        PAPER[1],
-        yes(report.pcc_is_stable(PAPER[0], PAPER[1]))
+        "for a leg without dynamics: EWMA (AII.18, corrected to 0 < λω < 2) up to ω = {ewma_limit:.4}, ω = {level} is {ewma}; \
+         PCC (AII.19) up to ω1 = {pcc_limit:.4} with ω2 = {PAPER_PROPORTION:.4} ω1, ω1 = {level}, ω2 = {drift} is {pcc}"
     );
     text.push_str(
         "resonance and lag of the leg lower these limits: use --spec to check the sampled loop of a platform\n",

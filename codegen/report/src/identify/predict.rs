@@ -116,12 +116,10 @@ pub fn summary(prediction: &Prediction) -> String {
         0 => String::new(),
         clipped => format!("; {clipped} samples clamped to the table's range"),
     };
+    let (rms, most, range) = (compared.rms_percent, compared.max_percent, compared.range * 1e6);
+    let cause = account(&compared.cause);
     format!(
-        "prediction error {:.3} % rms, at most {:.3} %, of {:.3} µm ({start}{clipped})\n  residual: {}",
-        compared.rms_percent,
-        compared.max_percent,
-        compared.range * 1e6,
-        account(&compared.cause)
+        "prediction error {rms:.3} % rms, at most {most:.3} %, of {range:.3} µm ({start}{clipped})\n  residual: {cause}"
     )
 }
 
@@ -129,11 +127,10 @@ impl Outcome for IdentificationResult<Prediction> {
     fn text(&self) -> String {
         let report = &self.report;
         let mut text = format!("{}: {}\n", report.record, summary(report));
+        let (delay, skipped) = (report.dead_time * 1e3, &report.samples_skipped);
         let _ = write!(
             text,
-            "  displacement delayed by {:.3} ms relative to the drive column; {} samples before the drive moves are ignored",
-            report.dead_time * 1e3,
-            report.samples_skipped
+            "  displacement delayed by {delay:.3} ms relative to the drive column; {skipped} samples before the drive moves are ignored"
         );
         if let Some(inertia) = report.inertia {
             let Inertia { mode: Mode { frequency, damping }, gain } = inertia;

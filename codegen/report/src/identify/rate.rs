@@ -108,9 +108,7 @@ fn write(output: &Path, identified: &RateIdentification) -> Result<Vec<PathBuf>,
         let block = spec_lines(*option, model, identified.report.held, &table, &rate_table);
         let prefix = if *option == best { "" } else { "# " };
         let _ = writeln!(lines, "\n# {}", option.name());
-        for line in block.lines() {
-            let _ = writeln!(lines, "{prefix}{line}");
-        }
+        lines.extend(block.lines().map(|line| format!("{prefix}{line}\n")));
     }
     lines += &format!("\n{}", MeasuredKeys::of(&keys(&identified.report), simulated).text());
     files.push((format!("{name}.toml"), lines.into_bytes()));
@@ -123,15 +121,11 @@ fn table(report: &RateReport) -> String {
     let mut text = String::new();
     // Writing to a String cannot fail.
     for record in &report.records {
+        let (name, frequency, speed) = (&record.record, record.frequency_text(), record.speed);
+        let (samples, range, noise) = (record.samples, record.range * 1e6, record.noise_percent);
         let _ = writeln!(
             text,
-            "{}: {} curves, median {:.0} V/s, {} samples, range {:.3} µm, noise {:.3} % of it",
-            record.record,
-            record.frequency_text(),
-            record.speed,
-            record.samples,
-            record.range * 1e6,
-            record.noise_percent
+            "{name}: {frequency} curves, median {speed:.0} V/s, {samples} samples, range {range:.3} µm, noise {noise:.3} % of it"
         );
     }
     if let Some(held) = &report.hold_out {
@@ -159,13 +153,11 @@ fn table(report: &RateReport) -> String {
                 "; no creep term improves the fit".to_owned()
             }
             _ if creep.is_empty() => String::new(),
-            RateOption::EvenCreep => format!(
-                "; creep {:.4} at each of {} time constants from {:.4} to {:.4} s",
-                option.creep[0].weight,
-                creep.len(),
-                option.creep[creep.len() - 1].time_constant,
-                option.creep[0].time_constant
-            ),
+            RateOption::EvenCreep => {
+                let (weight, count) = (option.creep[0].weight, creep.len());
+                let (fastest, slowest) = (option.creep[creep.len() - 1].time_constant, option.creep[0].time_constant);
+                format!("; creep {weight:.4} at each of {count} time constants from {fastest:.4} to {slowest:.4} s")
+            }
             _ => format!("; creep {}", creep.join(", ")),
         };
         let _ = writeln!(text, "{}: dead time {:.3} ms{creep}", option.option.name(), option.dead_time * 1e3);
@@ -180,20 +172,16 @@ fn table(report: &RateReport) -> String {
     if let Some(ring) = report.ring {
         let gain = report.options.iter().find_map(|option| option.inertia).map_or(0.0, |inertia| inertia.gain);
         let coarse = if report.grid < FINE_GRID { "; too large on this coarse grid" } else { "" };
+        let (frequency, damping, gain) = (ring.mode.frequency, ring.mode.damping, gain * 1e6);
         let _ = writeln!(
             text,
-            "mode: {:.1} Hz, damping ratio {:.4}, gain {:.5} µm/V (slope after a reversal{coarse})",
-            ring.mode.frequency,
-            ring.mode.damping,
-            gain * 1e6
+            "mode: {frequency:.1} Hz, damping ratio {damping:.4}, gain {gain:.5} µm/V (slope after a reversal{coarse})"
         );
         if let Some([frequency, amplitude]) = ring.at_first {
+            let (first, last_frequency, last) = (amplitude * 1e6, ring.mode.frequency, ring.amplitude * 1e6);
             let _ = writeln!(
                 text,
-                "its frequency by amplitude: {frequency:.1} Hz at {:.3} µm, {:.1} Hz at {:.3} µm",
-                amplitude * 1e6,
-                ring.mode.frequency,
-                ring.amplitude * 1e6
+                "its frequency by amplitude: {frequency:.1} Hz at {first:.3} µm, {last_frequency:.1} Hz at {last:.3} µm"
             );
         }
     }

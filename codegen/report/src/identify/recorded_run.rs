@@ -10,8 +10,10 @@ use crate::replay;
 use specgen_compiler::compile::Compilation;
 use specgen_compiler::lower;
 use specgen_identify::declared::{self, SpecRecords};
+use specgen_identify::marked_as_simulated;
 use specgen_language::model::{Model, RateDependence};
 use specgen_language::outcome::{Failure, Refusal};
+use specgen_language::output::write_folder;
 use specgen_language::ui::Ui;
 use specgen_numerics::displacements;
 use specgen_studies::controllers;
@@ -49,6 +51,40 @@ pub(super) fn replayed(recording: &Path, spec: &Path, compiled: &Compilation, ui
         Some(message) => Err(refuse(&message)),
         None => Ok(moves),
     }
+}
+
+/// The name of `folder`, which is relative to the current folder, relative to that of the spec.
+pub(super) fn within(spec: &Path, folder: &Path) -> Result<String, Failure> {
+    let dir = spec.parent().filter(|dir| !dir.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let whole = std::path::absolute(folder).unwrap_or_default();
+    // The folder itself may be new.
+    let parent = whole.parent().and_then(|parent| parent.canonicalize().ok());
+    let whole = parent.zip(whole.file_name()).map_or(whole.clone(), |(parent, name)| parent.join(name));
+    let dir = dir.canonicalize().unwrap_or_default();
+    let relative = whole.strip_prefix(dir).ok();
+    let plain = |path: &Path| path.components().all(|part| matches!(part, std::path::Component::Normal(_)));
+    let text = relative.filter(|path| plain(path)).and_then(Path::to_str);
+    let text = text.filter(|text| !text.is_empty() && !text.contains('\\'));
+    text.map(|text| text.trim_end_matches('/').to_owned()).ok_or_else(|| {
+        let expected = "expected a folder within that of the spec, such as `gains`, with forward slashes";
+        Failure::Usage(format!("-o `{}`: {expected}", folder.display()))
+    })
+}
+
+/// The spec line with the tables of a folder.
+pub(super) fn records_line(folder: &str) -> String {
+    format!("records = [{}]", [0, 1, 2, 3, 4, 5].map(|leg| format!("\"{folder}/leg{leg}.csv\"")).join(", "))
+}
+
+/// Writes one table for each leg, in leg order; returns a line about them. `simulated`: their shape comes from a simulated record
+/// of the spec.
+pub(super) fn write_tables(folder: &Path, tables: Vec<String>, simulated: bool) -> Result<String, Failure> {
+    let file = |(leg, text): (usize, String)| {
+        let text = if simulated { marked_as_simulated(&text) } else { text };
+        (format!("leg{leg}.csv"), text.into_bytes())
+    };
+    write_folder(folder, &tables.into_iter().enumerate().map(file).collect::<Vec<_>>())?;
+    Ok(format!("wrote 6 tables to {}\n", folder.display()))
 }
 
 /// Motion of the legs while the law moved them.

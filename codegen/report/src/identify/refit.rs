@@ -7,17 +7,17 @@ use std::path::Path;
 use serde::Serialize;
 use specgen_runtime::record::FILE_MAGIC;
 
-use super::recorded_run::{records, replayed};
+use super::recorded_run::{records, records_line, replayed, within, write_tables};
 use super::{MeasuredKeys, refused};
 use specgen_compiler::compile::Compilation;
 use specgen_compiler::spec_file;
 use specgen_identify::rate::RateModel;
 use specgen_identify::refit::{self, KNOWN, LegRefit, LegRun, Number, SPREAD};
-use specgen_identify::{marked_as_simulated, write_leg_csv};
+use specgen_identify::write_leg_csv;
 use specgen_language::files;
 use specgen_language::model::{Model, RateDependence};
 use specgen_language::outcome::{Failure, Outcome};
-use specgen_language::output::{check_input, write_folder};
+use specgen_language::output::check_input;
 use specgen_language::table::{right, row};
 use specgen_language::ui::Ui;
 
@@ -57,7 +57,7 @@ pub fn run(recording: &Path, spec: &Path, output: Option<&Path>, ui: &mut Ui) ->
     let mut legs: Vec<Leg> = Vec::new();
     for (leg, own) in (0..6).filter_map(|leg| Some((leg, tables.leg(&compiled.model, leg)?))) {
         let run = LegRun {
-            shown_as: &format!("{shown}, leg {}", leg + 1),
+            shown_as: &format!("{shown}, leg {leg}"),
             time: &moves.times,
             voltage: &moves.voltages[leg],
             displacement: &moves.displacements[leg],
@@ -78,8 +78,7 @@ pub fn run(recording: &Path, spec: &Path, output: Option<&Path>, ui: &mut Ui) ->
     let (mut files, mut lines, mut keys) = (String::new(), String::new(), Vec::new());
     if let Some((name, folder)) = folder {
         let shaped = legs.iter().any(|(_, found)| found.is_some_and(|found| found.differs()[2]));
-        write_folder(folder, &tables_of(&legs, shaped, simulated).map_err(|why| refuse(&why))?)?;
-        files = format!("wrote 6 tables to {}\n", folder.display());
+        files = write_tables(folder, tables_of(&legs, shaped).map_err(|why| refuse(&why))?, simulated)?;
         let lead = lead_line(&legs, lead);
         keys = ["hysteresis.records"].into_iter().chain(lead.as_ref().map(|_| "control.lead")).collect();
         lines = records_lines(&compiled.model, &name, shaped) + &lead.unwrap_or_default();
@@ -90,15 +89,12 @@ pub fn run(recording: &Path, spec: &Path, output: Option<&Path>, ui: &mut Ui) ->
     Ok(())
 }
 
-/// Name and text of the table of each leg. `shaped`: all with a read-out.
-fn tables_of(legs: &[Leg], shaped: bool, simulated: bool) -> Result<Vec<(String, Vec<u8>)>, String> {
+/// The table of each leg. `shaped`: all with a read-out.
+fn tables_of(legs: &[Leg], shaped: bool) -> Result<Vec<String>, String> {
     let table = |(leg, (own, found)): (usize, &Leg)| {
         let [gain, cubic] = found.map_or([0.0; 2], |found| found.changes());
         let changed = refit::refitted(own, gain, cubic, shaped);
-        let text = write_leg_csv(&changed.map_err(|why| format!("leg {} of 1 to 6: {why}", leg + 1))?);
-        // The shape comes from the spec's record, which may be simulated.
-        let text = if simulated { marked_as_simulated(&text) } else { text };
-        Ok((format!("leg{}.csv", leg + 1), text.into_bytes()))
+        Ok(write_leg_csv(&changed.map_err(|why| format!("leg {leg}: {why}"))?))
     };
     legs.iter().enumerate().map(table).collect()
 }
@@ -119,12 +115,9 @@ fn is_plausible(found: &LegRefit) -> bool {
 /// Why a run is unsuitable, and how to record a better one.
 fn implausible(leg: usize, found: &LegRefit, spec: &Path) -> String {
     let [gain, _, cubic] = found.numbers();
+    let (gain, cubic, advice) = (gain.change * 1e2, cubic.change * 1e2, advice(spec));
     format!(
-        "leg {} of 1 to 6: gain {:+.1} %, cubic term {:+.1} % are not plausible: check the table in the spec, or {}",
-        leg + 1,
-        gain.change * 1e2,
-        cubic.change * 1e2,
-        advice(spec)
+        "leg {leg}: gain {gain:+.1} %, cubic term {cubic:+.1} % are not plausible: check the table in the spec, or {advice}"
     )
 }
 
@@ -146,32 +139,13 @@ fn advice(spec: &Path) -> String {
     ADVICE.replace("SPEC", &spec.display().to_string())
 }
 
-/// The name of `folder`, which is relative to the current folder, relative to that of the spec.
-fn within(spec: &Path, folder: &Path) -> Result<String, Failure> {
-    let dir = spec.parent().filter(|dir| !dir.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let whole = std::path::absolute(folder).unwrap_or_default();
-    // The folder itself may be new.
-    let parent = whole.parent().and_then(|parent| parent.canonicalize().ok());
-    let whole = parent.zip(whole.file_name()).map_or(whole.clone(), |(parent, name)| parent.join(name));
-    let dir = dir.canonicalize().unwrap_or_default();
-    let relative = whole.strip_prefix(dir).ok();
-    let plain = |path: &Path| path.components().all(|part| matches!(part, std::path::Component::Normal(_)));
-    let text = relative.filter(|path| plain(path)).and_then(Path::to_str);
-    let text = text.filter(|text| !text.is_empty() && !text.contains('\\'));
-    text.map(|text| text.trim_end_matches('/').to_owned()).ok_or_else(|| {
-        let expected = "expected a folder within that of the spec, such as `gains`, with forward slashes";
-        Failure::Usage(format!("-o `{}`: {expected}", folder.display()))
-    })
-}
-
 /// The spec lines with the tables. Creep of the spec moves into tables with a read-out around them.
 fn records_lines(model: &Model, folder: &str, shaped: bool) -> String {
-    let names: Vec<String> = (1..=6).map(|leg| format!("\"{folder}/leg{leg}.csv\"")).collect();
     let creep = match &model.hysteresis.rate {
         RateDependence::Creep(_) if shaped => "rate = \"static\"  # remove creep_times and creep_weights\n",
         _ => "",
     };
-    format!("[hysteresis]\nrecords = [{}]\n{creep}", names.join(", "))
+    format!("[hysteresis]\n{}\n{creep}", records_line(folder))
 }
 
 /// The spec line with the mean delay of the legs that show one, if it differs; `old` is the lead now, s. A lead is at least
@@ -219,8 +193,7 @@ impl Refits {
             if !differing.is_empty() {
                 let held = found.differs()[0] && !found.cubic.accepted;
                 let assumed = if held { ", cubic term assumed unchanged" } else { "" };
-                let _ =
-                    writeln!(text, "leg {}: {} since identification{assumed}; refit", leg + 1, differing.join(", "));
+                let _ = writeln!(text, "leg {leg}: {} since identification{assumed}; refit", differing.join(", "));
             }
         }
         if text.is_empty() {
@@ -237,7 +210,7 @@ impl Refits {
                 .legs
                 .iter()
                 .enumerate()
-                .map(|(leg, found)| (leg + 1, found.as_ref()))
+                .map(|(leg, found)| (leg, found.as_ref()))
                 .filter(|(_, found)| found.is_none_or(|found| !found.numbers()[k].accepted))
                 .collect();
             if legs.is_empty() {
@@ -249,11 +222,8 @@ impl Refits {
             let of_leg = |found: &Option<&LegRefit>| found.map_or(f64::INFINITY, |found| found.numbers()[k].error);
             let worst = legs.iter().map(|(_, found)| of_leg(found)).fold(0.0, |a, b| if b > a { b } else { a });
             let known = if worst < 1e3 * size {
-                format!(
-                    "standard error up to {:.digits$}{unit}, {:.digits$}{unit} required",
-                    worst * size,
-                    KNOWN * SPREAD[k] * size
-                )
+                let (up_to, required) = (worst * size, KNOWN * SPREAD[k] * size);
+                format!("standard error up to {up_to:.digits$}{unit}, {required:.digits$}{unit} required")
             } else {
                 "this run does not show it at all".to_owned()
             };
@@ -287,7 +257,7 @@ fn error(number: &Number, size: f64, digits: usize) -> String {
 impl Outcome for Refits {
     fn text(&self) -> String {
         let mut text =
-            format!("{}: legs 1 to 6 relative to their models, from {:.3} s\n", self.recording, self.seconds);
+            format!("{}: legs 0 to 5 relative to their models, from {:.3} s\n", self.recording, self.seconds);
         let columns = [4, 8, 7, 9, 8, 8, 7, 10, 9, 8].map(|width| right(width).behind(" "));
         row(
             &mut text,
@@ -308,21 +278,12 @@ impl Outcome for Refits {
                 (change, error(&numbers[k], size, digits))
             };
             let [gain, delay, cubic] = [shown(0), shown(1), shown(2)];
+            let [after, before] = [found.residual_rms, found.residual_before].map(|rms| format!("{:.1}", rms * 1e9));
+            let travel = format!("{:.3}", found.travel * 1e6);
             row(
                 &mut text,
                 &columns,
-                &[
-                    &(leg + 1),
-                    &gain.0,
-                    &gain.1,
-                    &delay.0,
-                    &delay.1,
-                    &cubic.0,
-                    &cubic.1,
-                    &format_args!("{:.3}", found.travel * 1e6),
-                    &format_args!("{:.1}", found.residual_rms * 1e9),
-                    &format_args!("{:.1}", found.residual_before * 1e9),
-                ],
+                &[&leg, &gain.0, &gain.1, &delay.0, &delay.1, &cubic.0, &cubic.1, &travel, &after, &before],
             );
         }
         text += &self.refusals();

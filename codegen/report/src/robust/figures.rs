@@ -276,14 +276,10 @@ impl<'a> StudyResult<'a> {
     /// One line per run: every figure and every factor with full precision.
     pub fn csv(&self) -> String {
         let mut out = "name,seed,drawn,diverged,diverged_at_s".to_owned();
-        for row in self.rows() {
-            let _ = write!(out, ",{}", row.key);
-        }
+        out.extend(self.rows().map(|row| format!(",{}", row.key)));
         out.push_str(",mass,damping,noise,delay_ticks");
         for factor in EACH {
-            for leg in 0..6 {
-                let _ = write!(out, ",{factor}[{leg}]");
-            }
+            out.extend((0..6).map(|leg| format!(",{factor}[{leg}]")));
         }
         out.push_str(",seconds,path_seconds");
         if self.work.learning.is_some() {
@@ -304,9 +300,7 @@ impl<'a> StudyResult<'a> {
             }
             let d = &member.deviation;
             let _ = write!(out, ",{},{},{},{}", d.mass, d.damping, d.noise, d.delay_ticks);
-            for value in EACH.into_iter().flat_map(|factor| by_leg(d, factor)) {
-                let _ = write!(out, ",{value}");
-            }
+            out.extend(EACH.into_iter().flat_map(|factor| by_leg(d, factor)).map(|value| format!(",{value}")));
             let figures = outcome.figures();
             let mut measured = vec![figures.map(|figures| figures.coverage)];
             if self.work.learning.is_some() {
@@ -335,15 +329,11 @@ impl CommandOutcome for Report<'_> {
         let (found, mut out) = (&self.found, String::new());
         let drawn = self.runs.iter().filter(|run| run.member.drawn).count();
         // Writing to a String cannot fail, here and below.
+        let (name, trajectory, frequency) = (&self.name, &self.trajectory, self.frequency);
+        let (machines, seed, noise) = (self.runs.len(), self.seed, if self.noise { "" } else { ", without noise" });
         let _ = writeln!(
             out,
-            "{}: {} at {} Hz on {} machines, {drawn} of them random (seed {}){}",
-            self.name,
-            self.trajectory,
-            self.frequency,
-            self.runs.len(),
-            self.seed,
-            if self.noise { "" } else { ", without noise" },
+            "{name}: {trajectory} at {frequency} Hz on {machines} machines, {drawn} of them random (seed {seed}){noise}"
         );
         if let Some(coverage) = &self.coverage {
             let _ = writeln!(out, "each run measured over {coverage}");
@@ -370,9 +360,7 @@ impl CommandOutcome for Report<'_> {
             if self.gate.reasons.is_empty() {
                 let _ = writeln!(out, "gate: passed ({})", found.gate_conditions());
             }
-            for reason in self.gate.reasons {
-                let _ = writeln!(out, "gate: {reason}");
-            }
+            out.extend(self.gate.reasons.iter().map(|reason| format!("gate: {reason}\n")));
         }
         out
     }
@@ -432,9 +420,7 @@ fn described(d: &Deviation) -> String {
             let _ = write!(out, ", {factor} {:.3}", values[0]);
         } else {
             let _ = write!(out, "\n    {factor:<11} by leg", factor = factor.name());
-            for value in values {
-                let _ = write!(out, " {value:.3}");
-            }
+            out.extend(values.iter().map(|value| format!(" {value:.3}")));
         }
     }
     out

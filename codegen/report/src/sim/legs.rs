@@ -179,9 +179,7 @@ pub(super) fn run(
             select(controller, word).map_err(environment)?;
             for frequency in TRACKING_FREQUENCIES {
                 let run = scenario.run(controller, frequency).map_err(run_failure)?;
-                let stem = format!("trace-{mode}-{frequency}hz");
-                traces.push((format!("{stem}.csv"), run.trace.to_csv().into_bytes()));
-                traces.push((format!("{stem}.trace"), run.trace.to_bytes()));
+                traces.push((format!("trace-{mode}-{frequency}hz.csv"), run.trace.to_csv().into_bytes()));
             }
         }
     }
@@ -245,14 +243,10 @@ impl Outcome for Tables<'_> {
         let _ = writeln!(out, "{name}: slope of Y over q̂, relative to 0.1 Hz (paper's Table 1)");
         for (index, row) in self.linearity.rows.iter().enumerate() {
             let paper = printed::slope_ratio(index);
-            let _ = writeln!(
-                out,
-                "  {:>5} Hz  λ {:.4}  offset {:>8.1} nm  ratio {:.4} ({paper:.4})",
-                row.frequency_hz,
-                row.gain_ratio,
-                row.offset_um * 1e3,
-                row.relative_slope
-            );
+            let (hertz, ratio, offset) = (row.frequency_hz, row.gain_ratio, row.offset_um * 1e3);
+            let slope = row.relative_slope;
+            let _ =
+                writeln!(out, "  {hertz:>5} Hz  λ {ratio:.4}  offset {offset:>8.1} nm  ratio {slope:.4} ({paper:.4})");
         }
         out + self.plot.as_deref().unwrap_or_default()
     }

@@ -199,9 +199,7 @@ impl Outcome for Report<'_> {
             Results::Trajectory(played) => out += &played.text(),
             Results::Nothing {} => {}
         }
-        for line in self.refused.iter().chain(&self.limited) {
-            let _ = writeln!(out, "{line}");
-        }
+        out.extend(self.refused.iter().chain(&self.limited).map(|line| format!("{line}\n")));
         out + self.plot.as_deref().unwrap_or_default()
     }
 }
@@ -405,9 +403,7 @@ fn csv(motions: &[Motion]) -> String {
     for Motion { name, coverage, rms_nano, translation_nm, peak_nm, .. } in motions {
         // Writing to a String cannot fail, here and below.
         let _ = write!(out, "{name},{:.6},{:.6}", coverage.seconds, coverage.path_seconds);
-        for value in rms_nano {
-            let _ = write!(out, ",{value:.4}");
-        }
+        out.extend(rms_nano.iter().map(|value| format!(",{value:.4}")));
         let _ = writeln!(out, ",{translation_nm:.4},{peak_nm:.4}");
     }
     out

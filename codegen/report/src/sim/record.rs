@@ -50,13 +50,8 @@ struct RecordFile {
 impl Outcome for RecordFile {
     fn text(&self) -> String {
         let (bytes, ticks) = (self.bytes as f64, self.ticks as f64);
-        format!(
-            "wrote {ticks} ticks, {:.3} s, to {}: {:.1} MB, {:.0} bytes per tick\n",
-            self.seconds,
-            self.file,
-            bytes / 1e6,
-            bytes / ticks
-        )
+        let (seconds, file, megabytes, each) = (self.seconds, &self.file, bytes / 1e6, bytes / ticks);
+        format!("wrote {ticks} ticks, {seconds:.3} s, to {file}: {megabytes:.1} MB, {each:.0} bytes per tick\n")
     }
 }
 

@@ -118,14 +118,11 @@ pub fn pane(run: &PlottedRun) -> Vec<Part> {
     };
     let groups = error_groups(run.lengths == 3, range);
     let follows = if at_corner { "; the peak is after a corner of the path" } else { "" };
+    let (law, name, most, rms) = (run.law, run.names[worst], short(peak[worst]), short(rms[worst]));
+    let coverage = run.coverage;
     vec![
         Part::Lead(format!(
-            "With {}, {} stays within {}\u{2009}nm of {what}, {}\u{2009}nm rms over {}{follows}.",
-            run.law,
-            run.names[worst],
-            short(peak[worst]),
-            short(rms[worst]),
-            run.coverage
+            "With {law}, {name} stays within {most}\u{2009}nm of {what}, {rms}\u{2009}nm rms over {coverage}{follows}."
         )),
         Part::Multiples(Multiples { id: format!("axes-{id}"), items, groups, selected: worst }),
     ]

@@ -102,21 +102,21 @@ impl Outcome for EvaluationReport<'_> {
     fn text(&self) -> String {
         let mut text = String::new();
         // Writing to a String cannot fail, here and below.
-        for Parameter { name, bounds: [low, high], spec } in &self.parameters {
-            let _ = writeln!(text, "{name:<8} {low:.3e} to {high:.3e}, {spec:.3e} in the spec");
-        }
+        text.extend(self.parameters.iter().map(|Parameter { name, bounds: [low, high], spec }| {
+            format!("{name:<8} {low:.3e} to {high:.3e}, {spec:.3e} in the spec\n")
+        }));
         for (index, Candidate { verdict, .. }) in self.candidates.iter().enumerate() {
             let score = match verdict {
                 Verdict::Unstable => "unstable, or margins not met".to_owned(),
                 Verdict::Run(Evaluation::Limited { time, .. }) => format!("at a limit after {time:.4} s"),
-                Verdict::Run(Evaluation::Scored(score)) => format!(
-                    "cost {:.5} µm s², {:.2} nm rms, {:.2} nrad rms, effort {:.2} nm over {}",
-                    score.cost,
-                    score.translation_nm,
-                    score.orientation_nrad,
-                    score.effort_nm,
-                    score.coverage.brief()
-                ),
+                Verdict::Run(Evaluation::Scored(score)) => {
+                    let (cost, translation) = (score.cost, score.translation_nm);
+                    let (orientation, effort) = (score.orientation_nrad, score.effort_nm);
+                    let coverage = score.coverage.brief();
+                    format!(
+                        "cost {cost:.5} µm s², {translation:.2} nm rms, {orientation:.2} nrad rms, effort {effort:.2} nm over {coverage}"
+                    )
+                }
             };
             let _ = writeln!(text, "candidate {index}: {score}");
         }

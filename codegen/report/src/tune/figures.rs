@@ -146,14 +146,12 @@ impl<'a> Report<'a> {
             let (unstable, limited) =
                 search.history.iter().fold((0, 0), |(a, b), one| (a + one.unstable, b + one.limited));
             // Writing to a String cannot fail, here and below.
+            let (name, candidates, runs) = (search.optimiser, search.evaluations, search.runs);
+            let seconds = search.runs as f64 * self.seconds;
+            let best = search.best.map_or("none".to_owned(), |best| format!("{:.5} µm s²", best.score.cost));
             let _ = writeln!(
                 text,
-                "{}: {} candidates, {} simulated ({:.0} s of machine time), {unstable} unstable or below the margins, {limited} at a limit; best cost {}",
-                search.optimiser,
-                search.evaluations,
-                search.runs,
-                search.runs as f64 * self.seconds,
-                search.best.map_or("none".to_owned(), |best| format!("{:.5} µm s²", best.score.cost))
+                "{name}: {candidates} candidates, {runs} simulated ({seconds:.0} s of machine time), {unstable} unstable or below the margins, {limited} at a limit; best cost {best}"
             );
         }
         if let Some(ultimate) = self.relay {

@@ -146,19 +146,14 @@ impl<'a> Unit<'a> {
         let kind = |variable: &Variable| if variable.kind == WordKind::Real { 'r' } else { 'i' };
         let starts: Vec<String> = self.variables.iter().map(|variable| format!("{}u", variable.start)).collect();
         let starts: Vec<String> = starts.chunks(6).map(|line| format!("    {}", line.join(", "))).collect();
+        let (guid, period, tunable) = (self.guid(), self.compiled.model.timing.period, i32::from(self.tunable));
+        let (inputs, outputs, settings) = (count("input"), count("output"), count("parameter"));
+        let (kinds, starts) = (self.variables.iter().map(kind).collect::<String>(), starts.join(",\n"));
         format!(
-            "/* Written by `specgen export fmu`. */\n#ifndef FMU_H\n#define FMU_H\n\n#include <stdint.h>\n\n#define FMU_GUID \"{}\"\n\
-             #define FMU_PERIOD {:e}\n#define FMU_TUNABLE {}\nenum {{ FMU_INPUTS = {}, FMU_OUTPUTS = {}, FMU_SETTINGS = {} }};\n\
+            "/* Written by `specgen export fmu`. */\n#ifndef FMU_H\n#define FMU_H\n\n#include <stdint.h>\n\n#define FMU_GUID \"{guid}\"\n\
+             #define FMU_PERIOD {period:e}\n#define FMU_TUNABLE {tunable}\nenum {{ FMU_INPUTS = {inputs}, FMU_OUTPUTS = {outputs}, FMU_SETTINGS = {settings} }};\n\
              /* By value reference: r real, i integer; initial words. */\n\
-             static const char FMU_KINDS[] = \"{}\";\nstatic const uint64_t FMU_STARTS[] = {{\n{}\n}};\n{more}\n#endif\n",
-            self.guid(),
-            self.compiled.model.timing.period,
-            i32::from(self.tunable),
-            count("input"),
-            count("output"),
-            count("parameter"),
-            self.variables.iter().map(kind).collect::<String>(),
-            starts.join(",\n"),
+             static const char FMU_KINDS[] = \"{kinds}\";\nstatic const uint64_t FMU_STARTS[] = {{\n{starts}\n}};\n{more}\n#endif\n"
         )
     }
 
@@ -197,17 +192,15 @@ impl<'a> Unit<'a> {
     fn description(&self) -> String {
         let (version, period) = (env!("CARGO_PKG_VERSION"), self.compiled.model.timing.period);
         let name = escaped(&self.compiled.ir.name);
+        let (guid, what, identifier) = (self.guid(), &self.what, &self.identifier);
         let mut text = format!(
-            "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<fmiModelDescription fmiVersion=\"2.0\" modelName=\"{name}\" guid=\"{}\" \
-             description=\"{} {name}: words of a tick, in m, rad, N, V, s\" version=\"{version}\" \
+            "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<fmiModelDescription fmiVersion=\"2.0\" modelName=\"{name}\" guid=\"{guid}\" \
+             description=\"{what} {name}: words of a tick, in m, rad, N, V, s\" version=\"{version}\" \
              generationTool=\"specgen {version}\" variableNamingConvention=\"structured\">\n\
-             <CoSimulation modelIdentifier=\"{}\" canHandleVariableCommunicationStepSize=\"true\" \
+             <CoSimulation modelIdentifier=\"{identifier}\" canHandleVariableCommunicationStepSize=\"true\" \
              canNotUseMemoryManagementFunctions=\"false\" canGetAndSetFMUstate=\"true\"/>\n\
              <LogCategories><Category name=\"logStatusError\"/></LogCategories>\n\
-             <DefaultExperiment startTime=\"0\" stopTime=\"1\" stepSize=\"{period:e}\"/>\n<ModelVariables>\n",
-            self.guid(),
-            self.what,
-            self.identifier,
+             <DefaultExperiment startTime=\"0\" stopTime=\"1\" stepSize=\"{period:e}\"/>\n<ModelVariables>\n"
         );
         // Outputs are discrete and none depends on an input of the same step, so units in a ring form no algebraic loop.
         // Before the first step, the outputs of a machine depend on its fixed settings.

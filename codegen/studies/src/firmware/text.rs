@@ -14,14 +14,9 @@ const LISTED: usize = 12;
 
 impl Outcome for BuildResult {
     fn text(&self) -> String {
-        let mut out = format!(
-            "{} → {} for {} (f{}, digest {})\n",
-            self.name,
-            self.artifact,
-            self.board,
-            self.bits,
-            &self.digest[..16]
-        );
+        let (name, artifact, board, bits) = (&self.name, &self.artifact, &self.board, self.bits);
+        let digest = &self.digest[..16];
+        let mut out = format!("{name} → {artifact} for {board} (f{bits}, digest {digest})\n");
         // Writing to a String cannot fail, here and below.
         if let Some(compiler) = &self.compiler {
             let _ = writeln!(out, "  compiler      {compiler}");
@@ -48,9 +43,7 @@ impl Outcome for BuildResult {
         if let Some(m) = self.measurement.as_ref().filter(|m| m.first_difference.is_none()) {
             let _ = writeln!(out, "  host and {} agree in every bit over {} ticks", m.machine, group(m.ticks));
         }
-        for note in &self.notes {
-            let _ = writeln!(out, "  note: {note}");
-        }
+        out.extend(self.notes.iter().map(|note| format!("  note: {note}\n")));
         out
     }
 }
@@ -127,13 +120,8 @@ pub fn sections(size: &Size) -> String {
             (true, false) => "flash",
             _ => "RAM",
         };
-        let _ = writeln!(
-            out,
-            "    {:<22} {:#010x} {:>10} bytes {place}",
-            section.name,
-            section.address,
-            group(section.bytes)
-        );
+        let (name, address, bytes) = (&section.name, section.address, group(section.bytes));
+        let _ = writeln!(out, "    {name:<22} {address:#010x} {bytes:>10} bytes {place}");
     }
     for (name, bytes) in size.variables.iter().take(LISTED) {
         let _ = writeln!(out, "    variable {name}: {} bytes", group(*bytes));
@@ -159,8 +147,6 @@ pub fn checked(checks: &TickChecks) -> String {
     let path: Vec<String> = checks.path.iter().map(|(name, frame)| format!("{name} {frame}")).collect();
     let bound = checks.stack.map_or("unbounded".to_owned(), |bytes| format!("at most {} bytes", group(bytes)));
     let _ = writeln!(out, "  stack: {bound}: {}", path.join(" → "));
-    for fault in &checks.faults {
-        let _ = writeln!(out, "  FAULT {}", fault.text);
-    }
+    out.extend(checks.faults.iter().map(|fault| format!("  FAULT {}\n", fault.text)));
     out
 }

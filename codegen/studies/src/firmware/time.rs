@@ -44,10 +44,9 @@ pub fn finding(compiled: &Compilation, estimate: &Estimate) -> Option<Diagnostic
 /// The time of a tick by part.
 pub fn text(estimate: &Estimate) -> String {
     let Estimate { worst, period, core, law, shortest, .. } = estimate;
+    let (margin, rate) = (100.0 * (1.0 - worst / period), 1e3 / shortest);
     let mut out = format!(
-        "  longest tick  {worst:.1} us of {period:.1} (modelled, {core:.0} MHz), {:.0} % margin; shortest period {shortest} us ({:.1} kHz)\n",
-        100.0 * (1.0 - worst / period),
-        1e3 / shortest
+        "  longest tick  {worst:.1} us of {period:.1} (modelled, {core:.0} MHz), {margin:.0} % margin; shortest period {shortest} us ({rate:.1} kHz)\n"
     );
     for (name, time) in &estimate.parts {
         let more = match *name {

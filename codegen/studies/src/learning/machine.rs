@@ -1,7 +1,5 @@
 //! A machine that can repeat a motion: what a pass needs, the simulated machine, and the checks of a pass.
 
-use std::fmt;
-
 use host_sim::closed_loop::RunError;
 use host_sim::platform::rig::{Bench, Request};
 use host_sim::word::status_words;
@@ -22,48 +20,31 @@ const LEGS: u32 = 0x3f;
 pub(super) const CORRECTION_LIMITED: u32 = 1 << 20;
 
 /// Why a pass or learning failed.
-#[derive(Debug)]
+#[derive(Debug, thiserror::Error)]
 pub enum LearnError {
     /// The simulated machine cannot make a pass.
-    Run(RunError),
+    #[error(transparent)]
+    Run(#[from] RunError),
     /// The controller refused a set-point or rejected a gauge in a pass; its status bits.
+    #[error(
+        "the controller cannot follow this motion: {}; make it slower, or raise control.setpoint.stream_speed or the \
+         workspace in the spec",
+        status_words(*.0)
+    )]
     Status(u32),
     /// Limits restricted the excitation; the status bits.
+    #[error(
+        "limits restricted the sweep, so the response could not be measured: {}; use a smaller motion or a larger \
+         control.correction",
+        status_words(*.0)
+    )]
     Limited(u32),
     /// The user or the machine stopped a pass. The machine's driver holds the reason.
+    #[error("a pass was ended by the user or the machine")]
     PassEnded,
     /// The device refuses the plan.
+    #[error("the device refuses this learning plan")]
     Refused,
-}
-
-impl fmt::Display for LearnError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Run(error) => error.fmt(f),
-            Self::Status(status) => write!(
-                f,
-                "the controller cannot follow this motion: {}; make it slower, or raise control.setpoint.stream_speed or the \
-                 workspace in the spec",
-                status_words(*status)
-            ),
-            Self::Limited(status) => write!(
-                f,
-                "limits restricted the sweep, so the response could not be measured: {}; use a smaller motion or a larger \
-                 control.correction",
-                status_words(*status)
-            ),
-            Self::PassEnded => f.write_str("a pass was ended by the user or the machine"),
-            Self::Refused => f.write_str("the device refuses this learning plan"),
-        }
-    }
-}
-
-impl std::error::Error for LearnError {}
-
-impl From<RunError> for LearnError {
-    fn from(error: RunError) -> Self {
-        Self::Run(error)
-    }
 }
 
 /// A machine that can repeat a motion.

@@ -45,11 +45,10 @@ pub fn larger_limit([sufficient, limit, most]: [f64; 3]) -> String {
     // A correction was limited, so a larger limit is needed, whatever was computed.
     let least = if sufficient > limit { sufficient } else { LARGER * limit };
     if least > most * SAME {
+        let (needed, allowed) = (least * 1e6, libm::floor(most * SAME * 1e8) / 1e2);
         return format!(
-            "the correction needs {:.1} um, but control.correction may be {} um at most: use a smaller or slower motion, or identify the \
-             legs again",
-            least * 1e6,
-            libm::floor(most * SAME * 1e8) / 1e2
+            "the correction needs {needed:.1} um, but control.correction may be {allowed} um at most: use a smaller or slower motion, or identify the \
+             legs again"
         );
     }
     let tenths = libm::ceil(least / SAME * 1e7) / 10.0;

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use specgen_language::files;
 use specgen_numerics::nyquist::square;
 
-use super::table::TableError;
+use super::table::{TableError, same};
 use specgen_numerics::complex6::{Matrix6c, inverse, multiply, spectral_radius};
 
 /// Format and version of the file.
@@ -88,14 +88,8 @@ impl Response {
     /// # Errors
     /// If it belongs to another.
     pub fn is_for(&self, digest: &str, machine: &str) -> Result<(), TableError> {
-        let other = |what, there: &str, here: &str| Err(TableError::Measured(what, there.to_owned(), here.to_owned()));
-        if self.digest != digest {
-            return other("spec with digest", &self.digest, digest);
-        }
-        if self.machine != machine {
-            return other("machine", &self.machine, machine);
-        }
-        Ok(())
+        let parts = [("spec with digest", &self.digest, digest), ("machine", &self.machine, machine)];
+        same(&parts, TableError::Measured)
     }
 
     /// T at a frequency, Hz, interpolated linearly; constant beyond the measured range.

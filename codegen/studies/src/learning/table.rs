@@ -1,6 +1,5 @@
 //! The learned correction as a table of knots, and its file with spec, machine and motion.
 
-use std::fmt;
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
@@ -33,37 +32,24 @@ pub struct Table {
 }
 
 /// Why a file is refused.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum TableError {
     /// The file cannot be read.
+    #[error("{0}")]
     Unread(String),
     /// Not a correction file.
+    #[error("not a correction written by `specgen learn`: {0}")]
     Format(String),
     /// It is for another spec, machine or motion: kind, value in the file, current value.
+    #[error("it was learned for the {0} `{1}`, not `{2}`; learn again without --from")]
     Other(&'static str, String, String),
     /// Not a response file.
+    #[error("not a response written by `specgen learn --excite`: {0}")]
     Response(String),
     /// The response of another spec or machine: kind, value in the file, current value.
+    #[error("it was measured with the {0} `{1}`, not `{2}`; measure it again with --excite")]
     Measured(&'static str, String, String),
 }
-
-impl fmt::Display for TableError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Unread(why) => f.write_str(why),
-            Self::Format(why) => write!(f, "not a correction written by `specgen learn`: {why}"),
-            Self::Other(what, there, here) => {
-                write!(f, "it was learned for the {what} `{there}`, not `{here}`; learn again without --from")
-            }
-            Self::Response(why) => write!(f, "not a response written by `specgen learn --excite`: {why}"),
-            Self::Measured(what, there, here) => {
-                write!(f, "it was measured with the {what} `{there}`, not `{here}`; measure it again with --excite")
-            }
-        }
-    }
-}
-
-impl std::error::Error for TableError {}
 
 impl Table {
     /// A table for the digest of a spec, a machine and a named motion from this start pose; `spacing` and `before` in ticks.
@@ -121,17 +107,23 @@ impl Table {
     /// # Errors
     /// If it is for another.
     pub fn is_for(&self, digest: &str, machine: &str, motion: &str) -> Result<(), TableError> {
-        let other = |what, there: &str, here: &str| Err(TableError::Other(what, there.to_owned(), here.to_owned()));
-        if self.digest != digest {
-            return other("spec with digest", &self.digest, digest);
-        }
-        if self.machine != machine {
-            return other("machine", &self.machine, machine);
-        }
-        if self.motion != motion {
-            return other("motion", &self.motion, motion);
-        }
-        Ok(())
+        let parts = [
+            ("spec with digest", &self.digest, digest),
+            ("machine", &self.machine, machine),
+            ("motion", &self.motion, motion),
+        ];
+        same(&parts, TableError::Other)
+    }
+}
+
+/// Compares what a file names with what is used: name, text in the file, text of the user.
+pub(super) fn same(
+    parts: &[(&'static str, &String, &str)],
+    error: fn(&'static str, String, String) -> TableError,
+) -> Result<(), TableError> {
+    match parts.iter().find(|(_, there, here)| there.as_str() != *here) {
+        Some((what, there, here)) => Err(error(what, (*there).clone(), (*here).to_owned())),
+        None => Ok(()),
     }
 }
 

@@ -34,21 +34,14 @@ pub struct Convergence {
 }
 
 /// Why the search is impossible.
-#[derive(Debug)]
+#[derive(Debug, thiserror::Error)]
 pub enum ConvergenceError {
     /// The spec's mode uses none of the tuned parameters.
+    #[error("{0}")]
     NothingToTune(String),
     /// A run failed.
+    #[error(transparent)]
     Run(RunError),
-}
-
-impl std::fmt::Display for ConvergenceError {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self {
-            Self::NothingToTune(why) => f.write_str(why),
-            Self::Run(error) => error.fmt(f),
-        }
-    }
 }
 
 /// Runs `generations` of 100 strings, starting from the spec's parameters, reduced until they meet the margins. The bytes do

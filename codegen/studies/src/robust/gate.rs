@@ -39,11 +39,8 @@ impl Gate {
             .map(|(member, _)| member.name.as_str())
             .collect();
         if let Some(first) = grew.first() {
-            reasons.push(format!(
-                "the error grew during learning on {} of {} machines, first {first}",
-                grew.len(),
-                runs.len()
-            ));
+            let (grown, all) = (grew.len(), runs.len());
+            reasons.push(format!("the error grew during learning on {grown} of {all} machines, first {first}"));
         }
         type Figure = fn(&Figures) -> Option<f64>;
         let looked_at: [(Option<f64>, &str, &str, Figure); 3] = [

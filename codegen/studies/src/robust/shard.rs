@@ -69,12 +69,10 @@ pub fn merged(plan: &Plan, parts: &[Part]) -> Result<Vec<(Member, Outcome)>, Str
         }
         let expected = shard.of(plan).members;
         if !runs.iter().map(|(member, _)| member).eq(&expected) {
+            let (machines, part, again) = (expected.len(), shard.index, shard.index);
             return Err(format!(
-                "`{name}` does not have the {} machines of part {} of {of}: it was modified or written by another version; run it \
-                 again with --shard {}/{of}",
-                expected.len(),
-                shard.index,
-                shard.index
+                "`{name}` does not have the {machines} machines of part {part} of {of}: it was modified or written by another version; run it \
+                 again with --shard {again}/{of}"
             ));
         }
         match by_index[shard.index as usize - 1].replace(part) {

@@ -31,22 +31,16 @@ pub fn to_csv(front: &[Candidate], space: &Space) -> String {
     let mut out = String::from(
         "candidate,error_nm,effort_nm,peak_nm,translation_nm,orientation_nrad,cost_um_s2,seconds,path_seconds",
     );
-    for parameter in &space.parameters {
-        let _ = write!(out, ",{}", parameter.role);
-    }
+    out.extend(space.parameters.iter().map(|parameter| format!(",{}", parameter.role)));
     out.push('\n');
     for Candidate { number, setting, score } in front {
         let figures =
             [score.error_nm, score.effort_nm, score.peak_nm, score.translation_nm, score.orientation_nrad, score.cost];
         // Writing to a String cannot fail, here and above.
         let _ = write!(out, "{number}");
-        for figure in figures {
-            let _ = write!(out, ",{figure:.6e}");
-        }
+        out.extend(figures.iter().map(|figure| format!(",{figure:.6e}")));
         let _ = write!(out, ",{:.6},{:.6}", score.coverage.seconds, score.coverage.path_seconds);
-        for parameter in &space.parameters {
-            let _ = write!(out, ",{:.3e}", space.value(setting, parameter.role));
-        }
+        out.extend(space.parameters.iter().map(|parameter| format!(",{:.3e}", space.value(setting, parameter.role))));
         out.push('\n');
     }
     out

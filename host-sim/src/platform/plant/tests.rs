@@ -149,11 +149,9 @@ fn long_steps_are_a_hundredth_of_a_nanometre_from_the_finest_in_both_classes_of_
     for (name, specimen) in classes() {
         for part in [None, Some(WorkPart::glass())] {
             let [whole, half] = long_from_finest(&specimen, part, 2.5e-6);
+            let (touching, whole_pm, half_pm) = (part.is_some(), whole * 1e12, half * 1e12);
             println!(
-                "10 Hz, 56 µm, {name}, touching {}: {:.1} pm in whole ticks, {:.1} pm in halves",
-                part.is_some(),
-                whole * 1e12,
-                half * 1e12
+                "10 Hz, 56 µm, {name}, touching {touching}: {whole_pm:.1} pm in whole ticks, {half_pm:.1} pm in halves"
             );
             assert!(whole < 20e-12 && half < 15e-12, "{name}: {whole:e} {half:e}");
         }
@@ -327,12 +325,8 @@ fn gauges_show_the_pose_behind_their_lag_in_small_steps_and_in_whole_ticks() {
         };
         let moved = expected.iter().map(|pose| pose[2].abs()).fold(0.0, f64::max);
         let [small, whole] = [false, true].map(|whole| worst(&run(whole), &expected));
-        println!(
-            "lag {lag} s: {:.1} pm in small steps, {:.1} pm in whole ticks, of {:.2} µm",
-            small * 1e12,
-            whole * 1e12,
-            moved * 1e6
-        );
+        let (small_pm, whole_pm, moved_um) = (small * 1e12, whole * 1e12, moved * 1e6);
+        println!("lag {lag} s: {small_pm:.1} pm in small steps, {whole_pm:.1} pm in whole ticks, of {moved_um:.2} µm");
         assert!(moved > 1e-6 && small < 1e-9 && whole < 0.2e-9, "{small:e} {whole:e}");
     }
 }

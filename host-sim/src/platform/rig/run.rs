@@ -264,12 +264,10 @@ impl PlatformRun {
             // Writing to a String cannot fail, here and below.
             let _ = write!(out, "{time:.6}");
             let error: Six = std::array::from_fn(|k| target[k] - tick.pose[k]);
-            for value in [target, &tick.pose, &error, &tick.measured].into_iter().flatten() {
-                let _ = write!(out, ",{value:.4e}");
-            }
-            for value in tick.voltage {
-                let _ = write!(out, ",{value:.4}");
-            }
+            out.extend(
+                [target, &tick.pose, &error, &tick.measured].into_iter().flatten().map(|value| format!(",{value:.4e}")),
+            );
+            out.extend(tick.voltage.iter().map(|value| format!(",{value:.4}")));
             let _ = writeln!(out, ",{},{}", tick.status, status_words(tick.status));
         }
         out

@@ -137,52 +137,38 @@ pub fn platform(random: &mut ChaCha8Rng, folder: &Path, index: usize) -> String 
     let step = (range[1] - range[0]) / f64::from(1_u32 << bits);
     let noise = step * draw.order(0.5, 10.0);
     let um = 1e6;
+    let [base_mm, platform_mm, base_angle] = [base * 1e3, radius * 1e3, angles[0].to_degrees()].map(digits);
+    let [platform_angle, height_mm] = [angles[1].to_degrees(), height * 1e3].map(digits);
     let mut text = format!(
-        "schema = 1\nname = \"plausible-{index}\"\n\n[geometry]\nbase_radius = \"{} mm\"\nplatform_radius = \"{} mm\"\nbase_angle = \"{} deg\"\nplatform_angle = \"{} deg\"\nheight = \"{} mm\"\n",
-        digits(base * 1e3),
-        digits(radius * 1e3),
-        digits(angles[0].to_degrees()),
-        digits(angles[1].to_degrees()),
-        digits(height * 1e3)
+        "schema = 1\nname = \"plausible-{index}\"\n\n[geometry]\nbase_radius = \"{base_mm} mm\"\nplatform_radius = \"{platform_mm} mm\"\nbase_angle = \"{base_angle} deg\"\nplatform_angle = \"{platform_angle} deg\"\nheight = \"{height_mm} mm\"\n"
     );
+    let grams = digits(mass * 1e3);
+    let moments = list(&[across * 1e9, across * 1e9 * draw.between(0.9, 1.1), along * 1e9], "g mm^2");
+    let [fixed, extensible] = [weight[0] * 1e3, weight[1] * 1e3].map(digits);
+    let fixed_moment = digits(moment(0, draw.between(1.0, 1.5)) * 1e9);
+    let [extensible_moment, fixed_centre] = [moment(1, draw.between(1.0, 1.5)) * 1e9, part[0] * 500.0].map(digits);
+    let extensible_centre = digits(part[1] * 500.0);
     text += &format!(
-        "\n[platform]\nmass = \"{} g\"\ninertia = {}\n\n[leg]\nfixed_mass = \"{} g\"\nextensible_mass = \"{} g\"\nfixed_inertia = \"{} g mm^2\"\nextensible_inertia = \"{} g mm^2\"\nfixed_center = \"{} mm\"\nextensible_center = \"{} mm\"\n",
-        digits(mass * 1e3),
-        list(&[across * 1e9, across * 1e9 * draw.between(0.9, 1.1), along * 1e9], "g mm^2"),
-        digits(weight[0] * 1e3),
-        digits(weight[1] * 1e3),
-        digits(moment(0, draw.between(1.0, 1.5)) * 1e9),
-        digits(moment(1, draw.between(1.0, 1.5)) * 1e9),
-        digits(part[0] * 500.0),
-        digits(part[1] * 500.0)
+        "\n[platform]\nmass = \"{grams} g\"\ninertia = {moments}\n\n[leg]\nfixed_mass = \"{fixed} g\"\nextensible_mass = \"{extensible} g\"\nfixed_inertia = \"{fixed_moment} g mm^2\"\nextensible_inertia = \"{extensible_moment} g mm^2\"\nfixed_center = \"{fixed_centre} mm\"\nextensible_center = \"{extensible_centre} mm\"\n"
     );
+    let [per_volt, stroke_um, slew_rate, newtons] = [gain * 1e9, stroke * um, slew * 1e-3, stiffness].map(digits);
+    let [hertz, damping] = [resonance, draw.between(0.05, 0.15)].map(digits);
     text += &format!(
-        "\n[actuator]\nstacks = {stacks}\nstack_gain = \"{} nm/V\"\nstroke = \"{} um\"\nvoltage = [\"0 V\", \"{volts} V\"]\nslew_rate = \"{} V/ms\"\naxial_stiffness = \"{} N/m\"\nresonance = \"{} Hz\"\ndamping_ratio = {}\n",
-        digits(gain * 1e9),
-        digits(stroke * um),
-        digits(slew * 1e-3),
-        digits(stiffness),
-        digits(resonance),
-        digits(draw.between(0.05, 0.15))
+        "\n[actuator]\nstacks = {stacks}\nstack_gain = \"{per_volt} nm/V\"\nstroke = \"{stroke_um} um\"\nvoltage = [\"0 V\", \"{volts} V\"]\nslew_rate = \"{slew_rate} V/ms\"\naxial_stiffness = \"{newtons} N/m\"\nresonance = \"{hertz} Hz\"\ndamping_ratio = {damping}\n"
     );
+    let [lag_us, rms] = [lag * um, volts * draw.order(5e-6, 5e-5) * 1e3].map(digits);
+    let (dac_bits, low) = (draw.one_of(&[16, 18, 20]), draw.one_of(&[0.0, -20.0]));
+    let (high, spans) = (volts + draw.one_of(&[0.0, 20.0]), list(&range.map(|x| x * um), "um"));
+    let noise_nm = digits(noise * 1e9);
     text += &format!(
-        "\n[amplifier]\nlag = \"{} us\"\nnoise = \"{} mV\"\n\n[dac]\nbits = {}\nrange = [\"{} V\", \"{} V\"]\n\n[sensor]\nrange = {}\nnoise = \"{} nm\"\nbits = {bits}\n",
-        digits(lag * um),
-        digits(volts * draw.order(5e-6, 5e-5) * 1e3),
-        draw.one_of(&[16, 18, 20]),
-        draw.one_of(&[0.0, -20.0]),
-        volts + draw.one_of(&[0.0, 20.0]),
-        list(&range.map(|x| x * um), "um"),
-        digits(noise * 1e9)
+        "\n[amplifier]\nlag = \"{lag_us} us\"\nnoise = \"{rms} mV\"\n\n[dac]\nbits = {dac_bits}\nrange = [\"{low} V\", \"{high} V\"]\n\n[sensor]\nrange = {spans}\nnoise = \"{noise_nm} nm\"\nbits = {bits}\n"
     );
     text += &format!("\n[hysteresis]\ngrid = {grid}\nmemory = {}\nrecords = [\"{name}\"]\n", draw.one_of(&[32, 64]));
     if control {
+        let (mode, damping) = (draw.one_of(&["invhys", "ewma", "pcc"]), digits(draw.between(0.015, 0.05)));
+        let [lead, bias] = [(lag * draw.between(0.0, 0.8)).max(0.1 * period) * um, lift * um].map(digits);
         text += &format!(
-            "\n[adaptation]\nmode = \"{}\"\n\n[control]\nmodal_damping = {}\nlead = \"{} us\"\n\n[control.setpoint]\nbias = [\"0 um\", \"0 um\", \"{} um\", \"0 urad\", \"0 urad\", \"0 urad\"]\nSTREAM_SPEED\n",
-            draw.one_of(&["invhys", "ewma", "pcc"]),
-            digits(draw.between(0.015, 0.05)),
-            digits((lag * draw.between(0.0, 0.8)).max(0.1 * period) * um),
-            digits(lift * um)
+            "\n[adaptation]\nmode = \"{mode}\"\n\n[control]\nmodal_damping = {damping}\nlead = \"{lead} us\"\n\n[control.setpoint]\nbias = [\"0 um\", \"0 um\", \"{bias} um\", \"0 urad\", \"0 urad\", \"0 urad\"]\nSTREAM_SPEED\n"
         );
         let turn = draw.between(0.0, TAU);
         let place = |angle: f64| [at * (turn + angle).cos(), at * (turn + angle).sin()];
@@ -227,12 +213,10 @@ pub fn platform(random: &mut ChaCha8Rng, folder: &Path, index: usize) -> String 
         let weight = TAU * resonance * period * 0.05 * draw.between(0.2, 0.6);
         text += &format!("\n[adaptation]\nmode = \"ewma\"\nlevel_weight = {}\n", digits(weight));
     }
+    let (us, translation) = (period * um, list(&workspace.map(|x| x * um), "um"));
+    let (rotation, scalar) = (list(&turns.map(|x| x * 1e3), "mrad"), draw.one_of(&["f64", "f32"]));
     text += &format!(
-        "\n[timing]\nperiod = \"{} us\"\n\n[workspace]\ntranslation = {}\nrotation = {}\n\n[controller]\nscalar = \"{}\"\n",
-        period * um,
-        list(&workspace.map(|x| x * um), "um"),
-        list(&turns.map(|x| x * 1e3), "mrad"),
-        draw.one_of(&["f64", "f32"])
+        "\n[timing]\nperiod = \"{us} us\"\n\n[workspace]\ntranslation = {translation}\nrotation = {rotation}\n\n[controller]\nscalar = \"{scalar}\"\n"
     );
     text += "\n[target.budget]\nflash = \"128 KiB\"\nram = \"32 KiB\"\n";
     text

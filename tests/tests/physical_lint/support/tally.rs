@@ -146,13 +146,10 @@ pub fn hit_rate(bases: &[Base], make: fn(&str) -> Vec<Mutant>, seed: u64, share:
         tally.good += one.at_key + one.named;
         tally.undetectable += one.undetectable;
     }
+    let (good, all, of_all) = (tally.good, tally.all, 100.0 * tally.of_all());
+    let (of_detectable, undetectable) = (100.0 * tally.of_detectable(), tally.undetectable);
     println!(
-        "{} of {} found with the right key ({:.1} %; {:.1} % without the {} undetectable), of a pool of {whole}; not found:\n{missed}",
-        tally.good,
-        tally.all,
-        100.0 * tally.of_all(),
-        100.0 * tally.of_detectable(),
-        tally.undetectable
+        "{good} of {all} found with the right key ({of_all:.1} %; {of_detectable:.1} % without the {undetectable} undetectable), of a pool of {whole}; not found:\n{missed}"
     );
     println!("undetectable:");
     for (why, slips) in excused {

@@ -193,13 +193,8 @@ fn structural_modes_that_the_spec_lacks_end_quiet() {
         machine.structure = Some(structure);
         let Course { largest, times, left, replaced } = observe(&mut machine, specgen_tests::length(1.5, 3.0));
         assert_eq!(replaced, 0, "{structure:?}: good samples");
-        println!(
-            "  {structure:?}: {:.2} um, {}, {:.1} nm: {}",
-            largest * 1e6,
-            in_words(&times),
-            left * 1e9,
-            machine.word
-        );
+        let (moved, when, left_nm, word) = (largest * 1e6, in_words(&times), left * 1e9, machine.word);
+        println!("  {structure:?}: {moved:.2} um, {when}, {left_nm:.1} nm: {word}");
         assert_eq!(times.iter().filter(|time| time.is_some()).count(), last, "{structure:?}: {times:?}");
         within_the_bar(&times, &format!("{structure:?}"));
         assert!(left < 25e-9, "{structure:?}: {left} m");

@@ -40,12 +40,8 @@ impl Usage<'_> {
         let before = (self.machine.word.cause, self.machine.word.finding);
         let word = self.machine.tick(request);
         if (word.cause == OSCILLATION || word.finding != 0) && before != (word.cause, word.finding) {
-            self.alarms.push(format!(
-                "tick {}, {}: {word}, error {}",
-                self.machine.ticks,
-                self.what,
-                in_micrometres(&self.machine.error())
-            ));
+            let (ticks, what, error) = (self.machine.ticks, &self.what, in_micrometres(&self.machine.error()));
+            self.alarms.push(format!("tick {ticks}, {what}: {word}, error {error}"));
         }
     }
 

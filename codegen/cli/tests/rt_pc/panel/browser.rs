@@ -4,12 +4,13 @@ use std::fs;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
 use std::path::PathBuf;
-use std::process::{Child, Command, Stdio};
+use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
 use tungstenite::{Message, WebSocket};
 
+use super::super::ProcessGuard;
 use super::{LONG, Panel};
 use crate::support;
 
@@ -41,7 +42,7 @@ const LAYOUT: &str = r"(() => {
 
 /// A window.
 struct Window {
-    process: Child,
+    _process: ProcessGuard,
     socket: WebSocket<TcpStream>,
     _profile: tempfile::TempDir,
     asked: u64,
@@ -89,7 +90,8 @@ impl Window {
         let address = target["webSocketDebuggerUrl"].as_str().unwrap();
         let (socket, _) = tungstenite::client(address, TcpStream::connect(&at).unwrap()).unwrap();
         socket.get_ref().set_read_timeout(Some(LONG)).unwrap();
-        let mut window = Self { process, socket, _profile: profile, asked: 0, console: Vec::new() };
+        let mut window =
+            Self { _process: ProcessGuard(Some(process)), socket, _profile: profile, asked: 0, console: Vec::new() };
         for domain in ["Runtime", "Log", "Page"] {
             window.ask(&format!("{domain}.enable"), json!({}));
         }
@@ -204,13 +206,6 @@ impl Window {
     fn sound(mut self) {
         assert_eq!(self.value("document.documentElement.dataset.errors"), "0", "the page's own count of errors");
         assert_eq!(self.console, Vec::<String>::new(), "console");
-    }
-}
-
-impl Drop for Window {
-    fn drop(&mut self) {
-        let _ = self.process.kill();
-        let _ = self.process.wait();
     }
 }
 

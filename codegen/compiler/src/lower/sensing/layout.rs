@@ -108,14 +108,13 @@ fn target(model: &Model, k: usize, probe: &Probe) -> Result<Target, Vec<Diagnost
     // The checks of the spec refuse a line parallel to its plane, which would meet it at infinity.
     let far = norm(c);
     if far.is_nan() || far > FARTHEST * radius {
+        let (distance, joints) = (far * 1e3, radius * 1e3);
         return Err(vec![finding(
             model,
             codes::PROBE_MISSES,
             &format!("gauge[{k}].point"),
             format!(
-                "the line of gauge {k} meets its target plane {:.1} mm from P_C, but the platform's joints are {:.1} mm from it",
-                far * 1e3,
-                radius * 1e3
+                "the line of gauge {k} meets its target plane {distance:.1} mm from P_C, but the platform's joints are {joints:.1} mm from it"
             ),
             "check `point` and `direction` (in {B}), `target_point` and `target_normal` (in {P}, from P_C) of the gauge"
                 .to_owned(),

@@ -43,10 +43,9 @@ impl Excesses {
         let bound = user.bound[axis];
         let beyond = if value > 0.0 { value - bound } else { value + bound };
         let (table, item) = if axis < 3 { ("translation", axis) } else { ("rotation", axis - 3) };
+        let (by, to) = (outwards(axis, -beyond), outwards(axis, value.abs()));
         Some(format!(
-            "change control.setpoint.bias[{axis}] by {}, or widen workspace.{table}[{item}] to {}, if legs and gauges reach that far",
-            outwards(axis, -beyond),
-            outwards(axis, value.abs())
+            "change control.setpoint.bias[{axis}] by {by}, or widen workspace.{table}[{item}] to {to}, if legs and gauges reach that far"
         ))
     }
 
@@ -69,24 +68,19 @@ impl Excesses {
     pub fn messages(&self, model: &Model, user: &User, rules: &SetpointRules) -> [Option<(Worst, String)>; 2] {
         let place = self.place.map(|worst| {
             let axis = worst.axis;
-            let message = format!(
-                "{} is {} after {:.6} s, bias included, outside the workspace of ±{}",
-                AXES[axis],
-                amount(axis, worst.value),
-                worst.time,
-                amount(axis, user.bound[axis])
-            );
+            let (name, value, time) = (AXES[axis], amount(axis, worst.value), worst.time);
+            let bound = amount(axis, user.bound[axis]);
+            let message =
+                format!("{name} is {value} after {time:.6} s, bias included, outside the workspace of ±{bound}");
             (worst, message)
         });
         let speed = self.speed.map(|worst| {
             let axis = worst.axis;
+            let (name, speed, time) = (AXES[axis], amount(axis, worst.value.abs()), worst.time);
+            let step = amount(axis, worst.value.abs() * model.timing.period);
+            let limit = amount(axis, rules.stream_speed[axis]);
             let message = format!(
-                "{} moves at {}/s after {:.6} s ({} in a tick), faster than control.setpoint.stream_speed, {}/s",
-                AXES[axis],
-                amount(axis, worst.value.abs()),
-                worst.time,
-                amount(axis, worst.value.abs() * model.timing.period),
-                amount(axis, rules.stream_speed[axis])
+                "{name} moves at {speed}/s after {time:.6} s ({step} in a tick), faster than control.setpoint.stream_speed, {limit}/s"
             );
             (worst, message)
         });

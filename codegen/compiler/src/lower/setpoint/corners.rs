@@ -74,13 +74,9 @@ pub(super) fn warning(model: &Model, name: &str, waveform: &Waveform, period: f6
 pub fn step(waveform: &Waveform) -> Option<Diagnostic> {
     let Step { row, axis, step, around } = stands_out(waveform)?;
     let place = Place::File { path: waveform.shown_as.clone(), line: waveform.lines.get(row).copied() };
-    let message = format!(
-        "{} steps by {} {} here, but by at most {} in the rows around",
-        AXES[axis],
-        figure(step * 1e6),
-        if axis < 3 { "um" } else { "urad" },
-        figure(around * 1e6)
-    );
+    let (name, step, unit) = (AXES[axis], figure(step * 1e6), if axis < 3 { "um" } else { "urad" });
+    let around = figure(around * 1e6);
+    let message = format!("{name} steps by {step} {unit} here, but by at most {around} in the rows around");
     let help =
         "the platform rings after a jump: if it is between two pieces, join them, or spread the step over some rows";
     Some(Diagnostic::new(codes::WAVEFORM_STEP, "trajectory", place, message, help))

@@ -89,12 +89,10 @@ pub(super) fn lower(
     let end = pieces.last().map_or([0.0; 6], |piece| piece.at(piece.end, frequency).0);
     let warnings = corner(&joints)
         .map(|worst| {
+            let (name, time, axis) = (&task.trajectories[index].name, worst.time, AXES[worst.axis]);
+            let change = amount(worst.axis, worst.rate);
             let message = format!(
-                "trajectory \"{}\" has corners, the sharpest after {:.6} s, where the speed of {} changes by {}/s",
-                task.trajectories[index].name,
-                worst.time,
-                AXES[worst.axis],
-                amount(worst.axis, worst.rate)
+                "trajectory \"{name}\" has corners, the sharpest after {time:.6} s, where the speed of {axis} changes by {change}/s"
             );
             let help = "each corner makes the platform ring: expect errors there, or use a smoothed path as a waveform";
             Diagnostic::at(&model.spans, &[&key], codes::TRAJECTORY_CORNERS, message, help)

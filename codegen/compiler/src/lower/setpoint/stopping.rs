@@ -210,13 +210,10 @@ pub fn describe(stops: &[Stopping]) -> String {
         } else {
             format!("{} until it counts as stale, then ", list(&stop.coasted, 1e6, 2))
         };
+        let (what, speed, way) = (&stop.what, list(&stop.speed, 1e3, 3), list(&stop.way, 1e6, 2));
+        let (milliseconds, overshoot) = (stop.time * 1e3, list(&stop.overshoot, 1e6, 2));
         text += &format!(
-            "    {:<9} at {} per ms: {coasted}{} in {:.1} ms; the platform up to {} further\n",
-            stop.what,
-            list(&stop.speed, 1e3, 3),
-            list(&stop.way, 1e6, 2),
-            stop.time * 1e3,
-            list(&stop.overshoot, 1e6, 2)
+            "    {what:<9} at {speed} per ms: {coasted}{way} in {milliseconds:.1} ms; the platform up to {overshoot} further\n"
         );
     }
     text

@@ -30,12 +30,8 @@ pub(super) fn lower(
     if row_ticks < 1.0 || (period / tick - row_ticks).abs() > WHOLE || row_ticks * waveform.rows.len() as f64 > LONGEST
     {
         let nearest = if row_ticks < 1.0 { tick } else { row_ticks * tick };
-        let message = format!(
-            "trajectory \"{}\": rows every {:.4} ms do not fall on the ticks of {:.4} ms",
-            task.trajectories[index].name,
-            period * 1e3,
-            tick * 1e3
-        );
+        let (name, row, tick) = (&task.trajectories[index].name, period * 1e3, tick * 1e3);
+        let message = format!("trajectory \"{name}\": rows every {row:.4} ms do not fall on the ticks of {tick:.4} ms");
         let help =
             format!("choose a whole number of ticks, such as \"{:.4} ms\", and some minutes at most", nearest * 1e3);
         let key = format!("trajectory[{index}].period");
@@ -111,12 +107,10 @@ fn steps(task: &TaskSpace, waveform: &Waveform, period: f64, repeat: bool) -> Ve
         for (axis, speed) in task.setpoint.stream_speed.into_iter().enumerate() {
             let step = rows[next][axis] - row[axis];
             if step.abs() > speed * period {
+                let (name, jump, row) = (AXES[axis], amount(axis, step), period * 1e3);
+                let allowed = amount(axis, speed * period);
                 let message = format!(
-                    "{} jumps by {} within a row of {:.4} ms; control.setpoint.stream_speed allows {}",
-                    AXES[axis],
-                    amount(axis, step),
-                    period * 1e3,
-                    amount(axis, speed * period)
+                    "{name} jumps by {jump} within a row of {row:.4} ms; control.setpoint.stream_speed allows {allowed}"
                 );
                 let help = "check the unit in the column's name and the spec's period, or add rows";
                 findings.push(in_file(waveform, next, codes::TRAJECTORY_JUMPS, message, help));

@@ -30,14 +30,13 @@ pub(super) fn leap(
     if let Some(given) = model.supervisor.leap
         && given < noise
     {
+        let (leap, effect) = (given * 1e9, noise * 1e9);
         findings.push(finding(
             model,
             codes::SUPERVISOR_BOUND,
             "leap",
             format!(
-                "a leap of {:.4} nm is less than the effect of the gauge's noise and converter on three samples, {:.4} nm",
-                given * 1e9,
-                noise * 1e9
+                "a leap of {leap:.4} nm is less than the effect of the gauge's noise and converter on three samples, {effect:.4} nm"
             ),
             format!(
                 "write leap = \"{:.4} nm\" or more, or leave it out: the default is more than a leg can move at actuator.slew_rate",

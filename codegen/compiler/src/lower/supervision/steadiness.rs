@@ -56,14 +56,13 @@ pub(super) fn lower(
     let (arms, least) = arms_and_least(model, noise);
     let disturbance = model.supervisor.disturbance.unwrap_or(libm::fmax(defaults::disturbance(model), least));
     if disturbance < least {
+        let (given, effect) = (disturbance * 1e9, least * 1e9);
         findings.push(finding(
             model,
             codes::SUPERVISOR_BOUND,
             "disturbance",
             format!(
-                "a disturbance of {:.4} nm is less than the effect of the gauges' noise on one axis, {:.4} nm",
-                disturbance * 1e9,
-                least * 1e9
+                "a disturbance of {given:.4} nm is less than the effect of the gauges' noise on one axis, {effect:.4} nm"
             ),
             format!("write disturbance = \"{:.4} nm\" or more", above(least * 1e9)),
         ));

@@ -52,34 +52,30 @@ pub(super) fn lower(
     let chosen = match made(spec.amplitude, spec.time) {
         Ok(pulse) => pulse,
         Err(TooShort { time, least }) => {
+            let usual = figure(libm::fmax(least, defaults::WIRING_TIME) * 1e3);
+            let (given, required) = (time * 1e3, least * 1e3);
             findings.push(finding(
                 model,
                 codes::SUPERVISOR_TIME,
                 "wiring_check.time",
                 format!(
-                    "a pulse of {:.6} ms is too short: {FEWEST} periods and `actuator.slew_rate` require at least {:.6} ms",
-                    time * 1e3,
-                    least * 1e3
+                    "a pulse of {given:.6} ms is too short: {FEWEST} periods and `actuator.slew_rate` require at least {required:.6} ms"
                 ),
                 format!(
-                    "leave wiring_check.time out: the default is {} ms; it must be at least {:.6} ms",
-                    figure(libm::fmax(least, defaults::WIRING_TIME) * 1e3),
-                    least * 1e3
+                    "leave wiring_check.time out: the default is {usual} ms; it must be at least {required:.6} ms"
                 ),
             ));
             return None;
         }
     };
     if chosen.noise > NOISE {
+        let (noise, size, most) = (figure(chosen.noise * 1e2), figure(chosen.size * 1e6), NOISE * 1e2);
         findings.push(Diagnostic::at(
             &model.spans,
             &["supervisor.wiring_check.amplitude", "supervisor.wiring_check", "sensor.noise", "sensor"],
             codes::SUPERVISOR_BOUND,
             format!(
-                "the gauges' noise is {} % of the response of a leg or gauge to a pulse of {} um; at most {:.0} % is allowed",
-                figure(chosen.noise * 1e2),
-                figure(chosen.size * 1e6),
-                NOISE * 1e2
+                "the gauges' noise is {noise} % of the response of a leg or gauge to a pulse of {size} um; at most {most:.0} % is allowed"
             ),
             larger_or_longer(model, &chosen, made),
         ));

@@ -83,14 +83,13 @@ pub(super) fn too_low(model: &Model, closed_loop: &ClosedLoop, demand: &Structur
     let lowest = closed_loop.basis.frequencies[0] / TAU;
     let least = libm::ceil(LEAST_FROM * lowest);
     (demand.from < LEAST_FROM * lowest).then(|| {
+        let (from, times) = (&demand.from, demand.from / lowest);
         Diagnostic::at(
             &model.spans,
             &["robust.structure.f0", "robust.structure"],
             codes::STRUCTURE_TOO_LOW,
             format!(
-                "f0 is {:.0} Hz, {:.2} times the lowest mode of the platform, {lowest:.0} Hz; expected at least {LEAST_FROM} times",
-                demand.from,
-                demand.from / lowest
+                "f0 is {from:.0} Hz, {times:.2} times the lowest mode of the platform, {lowest:.0} Hz; expected at least {LEAST_FROM} times"
             ),
             format!(
                 "f0 = \"{least:.0} Hz\" or more; list a mode below that as [[mode]], if it is known, or raise its frequency"
@@ -157,16 +156,13 @@ impl Case<'_> {
         let touching = if self.closed_loop.environment == [0.0; 6] { "" } else { ", free or touching the work piece" };
         let [low, high] = self.model.adaptation.gain_ratio;
         let gauges = super::super::gauge_lag_text(self.closed_loop.gauge_lag);
+        let (period, first_mode) = (self.closed_loop.period, self.closed_loop.basis.frequencies[0] / TAU);
+        let (last_mode, damping) = (self.closed_loop.basis.frequencies[5] / TAU, self.closed_loop.damping[0]);
+        let lag = self.closed_loop.lag;
         format!(
-            "control mode {} is unstable on this platform: the loop sampled every {} s, with modes from {:.0} Hz to \
-             {:.0} Hz (damping ratio {:.3} of the first) and an amplifier lag of {} s{gauges}, has spectral radius {radius:.4} \
-             somewhere in gain_ratio [{low}, {high}]{touching}; it must be below 1",
-            control_mode,
-            self.closed_loop.period,
-            self.closed_loop.basis.frequencies[0] / TAU,
-            self.closed_loop.basis.frequencies[5] / TAU,
-            self.closed_loop.damping[0],
-            self.closed_loop.lag
+            "control mode {control_mode} is unstable on this platform: the loop sampled every {period} s, with modes from {first_mode:.0} Hz to \
+             {last_mode:.0} Hz (damping ratio {damping:.3} of the first) and an amplifier lag of {lag} s{gauges}, has spectral radius {radius:.4} \
+             somewhere in gain_ratio [{low}, {high}]{touching}; it must be below 1"
         )
     }
 
@@ -311,14 +307,13 @@ pub(super) fn thin(
         .map(|frequency| format!("{:.0} Hz", frequency / TAU))
         .collect();
     if task.notch_damping.is_some() && !missed.is_empty() {
+        let (uncovered, half) = (missed.join(", "), PI / closed_loop.period / TAU);
         findings.push(Diagnostic::at(
             &model.spans,
             &["control.notch_damping", "control.notch", "timing.period"],
             codes::MODE_NOT_NOTCHED,
             format!(
-                "the notch does not cover the modes at {}: they are near or above half the tick rate, {:.0} Hz",
-                missed.join(", "),
-                PI / closed_loop.period / TAU
+                "the notch does not cover the modes at {uncovered}: they are near or above half the tick rate, {half:.0} Hz"
             ),
             "shorten timing.period to cover them; the stability check includes them without the notch".to_owned(),
         ));

@@ -16,13 +16,8 @@ pub fn describe(design: &Design) -> String {
     let mut text = String::new();
     // Writing to a String cannot fail.
     let frequencies: Vec<String> = design.modes.iter().map(|mode| format!("{:.1}", mode.frequency / TAU)).collect();
-    let _ = writeln!(
-        text,
-        "  platform modes: {} Hz, damping ratio {:.4} to {:.4}",
-        frequencies.join(", "),
-        design.modes[0].damping_ratio,
-        design.modes[5].damping_ratio
-    );
+    let (hertz, first, last) = (frequencies.join(", "), design.modes[0].damping_ratio, design.modes[5].damping_ratio);
+    let _ = writeln!(text, "  platform modes: {hertz} Hz, damping ratio {first:.4} to {last:.4}");
     let whose = if design.lead_given { "from the spec" } else { "the delay from command to pose" };
     let _ = writeln!(text, "  lead: {:.4} ms, {whose}", design.lead * 1e3);
     let notch = if design.notch.is_some() { "with the modal notch" } else { "without a notch" };
@@ -48,17 +43,10 @@ pub fn describe(design: &Design) -> String {
             |value: Option<f64>, none: &str, digits: usize| value.map_or(none.to_owned(), |x| format!("{x:.digits$}"));
         let least = one.modes.iter().min_by(|a, b| a.damping_ratio.total_cmp(&b.damping_ratio));
         let least = least.map_or("-".to_owned(), |mode| format!("{:.0} Hz, {:.4}", mode.frequency, mode.damping_ratio));
-        let _ = writeln!(
-            text,
-            "  {:<12}{:>9.5}{:>8}{:>8}{:>16}{:>12}{:>22}",
-            one.law.to_string(),
-            one.spectral_radius,
-            or(one.gain_ratio_limit, "> 10", 2),
-            or(one.gain_margin, "-", 2),
-            or(one.delay_margin_ticks, "> 5", 2),
-            or(one.settling.map(|time| time * 1e3), "-", 1),
-            least
-        );
+        let (law, radius, ratio) = (one.law.to_string(), one.spectral_radius, or(one.gain_ratio_limit, "> 10", 2));
+        let (gain, delay) = (or(one.gain_margin, "-", 2), or(one.delay_margin_ticks, "> 5", 2));
+        let time = or(one.settling.map(|time| time * 1e3), "-", 1);
+        let _ = writeln!(text, "  {law:<12}{radius:>9.5}{ratio:>8}{gain:>8}{delay:>16}{time:>12}{least:>22}");
     }
     text.push_str(&structure(design));
     text
@@ -73,16 +61,12 @@ fn structure(design: &Design) -> String {
         "mode", "kind"
     );
     let frequencies = MULTIPLES.map(|multiple| multiple * from);
-    for frequency in frequencies {
-        let _ = write!(text, "{frequency:>9.0}");
-    }
+    text.extend(frequencies.iter().map(|frequency| format!("{frequency:>9.0}")));
     let _ = writeln!(text, "{:>22}", format!("most from {from:.0} Hz on"));
     for one in design.margins.iter().filter(|one| LoopKind::of(one.law) != LoopKind::Open) {
         for border in &one.borders {
             let _ = write!(text, "  {:<12}{:<7}", one.law.to_string(), border.kind);
-            for frequency in frequencies {
-                let _ = write!(text, "{:>9}", shown(border.within(frequency)));
-            }
+            text.extend(frequencies.iter().map(|frequency| format!("{:>9}", shown(border.within(*frequency)))));
             let worst = border.worst(from).map_or("any".to_owned(), |[at, ratio]| format!("{ratio:.4} at {at:.0} Hz"));
             let _ = writeln!(text, "{worst:>22}");
         }
@@ -109,11 +93,9 @@ fn gains(name: &str, tuning: &Tuning) -> String {
 #[must_use]
 pub fn describe_damping(design: &Design, damping: &ActiveDamping) -> String {
     let lowest = design.modes[0].frequency / TAU;
+    let (first, second, third) = (lowest / SLOW[0], lowest / SLOW[1], lowest / SLOW[2]);
     let mut text = format!(
-        "  active damping in P/F:   peak of       |S|             |S| at {:.1}, {:.1}, {:.0} Hz\n    mode                 compliance   largest   worst            (without)\n",
-        lowest / SLOW[0],
-        lowest / SLOW[1],
-        lowest / SLOW[2]
+        "  active damping in P/F:   peak of       |S|             |S| at {first:.1}, {second:.1}, {third:.0} Hz\n    mode                 compliance   largest   worst            (without)\n"
     );
     for (mode, found) in design.modes.iter().zip(&damping.modes) {
         // Writing to a String cannot fail.

@@ -79,16 +79,14 @@ pub(super) fn bandwidths_fit_period(f: &Fields, findings: &mut Findings) -> Opti
             continue;
         };
         if bandwidth * interval > 1.0 {
+            let (radians, seconds, plural) = (number(bandwidth), number(interval), if run == 1 { "" } else { "s" });
+            let weight = number(bandwidth * interval);
             findings.add(
                 codes::BANDWIDTH_TOO_HIGH,
                 &path,
                 f.span(&path),
                 format!(
-                    "{} rad/s over a run of {} s ({run} tick{}) is a weight of {}, expected at most 1",
-                    number(bandwidth),
-                    number(interval),
-                    if run == 1 { "" } else { "s" },
-                    number(bandwidth * interval)
+                    "{radians} rad/s over a run of {seconds} s ({run} tick{plural}) is a weight of {weight}, expected at most 1"
                 ),
                 format!(
                     "at most \"{} rad/s\" would do; or shorten `timing.period` or `adaptation.run_interval`",

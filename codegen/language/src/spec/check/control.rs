@@ -171,15 +171,12 @@ pub(super) fn cutoff_below_tick_rate(f: &Fields, findings: &mut Findings) -> Opt
     let path = "control.velocity_cutoff";
     let (cutoff, limit) = (f.number(path)?, PI / f.number("timing.period")?);
     if cutoff >= limit {
+        let [given, most] = [cutoff, limit].map(number);
         findings.add(
             codes::CUTOFF_TOO_HIGH,
             path,
             f.span(path),
-            format!(
-                "`{path}` is {} rad/s, expected less than half the tick rate, {} rad/s",
-                number(cutoff),
-                number(limit)
-            ),
+            format!("`{path}` is {given} rad/s, expected less than half the tick rate, {most} rad/s"),
             format!("write \"{} rad/s\" or less, or shorten `timing.period`", number(0.6 * limit)),
         );
     }
@@ -216,14 +213,13 @@ pub(super) fn bias_inside_workspace(f: &Fields, findings: &mut Findings) -> Opti
             continue;
         }
         let (unit, scale) = if axis < 3 { ("um", 1e6) } else { ("urad", 1e6) };
+        let [bias, workspace] = [value * scale, bound * scale].map(number);
         findings.add(
             codes::BIAS_OUTSIDE,
             &format!("{path}[{axis}]"),
             f.item_span(path, axis),
             format!(
-                "the bias of {} {unit} is outside the workspace of {} {unit} on this axis",
-                number(value * scale),
-                number(bound * scale)
+                "the bias of {bias} {unit} is outside the workspace of {workspace} {unit} on this axis"
             ),
             format!(
                 "the workspace counts from rest, including the bias: widen `workspace.{}` or reduce the bias; check the units of both",

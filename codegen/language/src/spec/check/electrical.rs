@@ -43,15 +43,13 @@ pub(super) fn slew_moves_a_code(f: &Fields, findings: &mut Findings) -> Option<(
     let (slew, period) = (f.number("actuator.slew_rate")?, f.number("timing.period")?);
     let code = (high - low) / (libm::ldexp(1.0, bits as i32) - 1.0);
     if low < high && slew * period < code {
+        let [seconds, change, step] = [period, slew * period, code].map(number);
         findings.add(
             codes::SLEW_BELOW_CODE,
             "actuator.slew_rate",
             f.span("actuator.slew_rate"),
             format!(
-                "in one period of {} s the voltage may change by {} V, less than one converter code of {} V",
-                number(period),
-                number(slew * period),
-                number(code)
+                "in one period of {seconds} s the voltage may change by {change} V, less than one converter code of {step} V"
             ),
             format!("at least {} V/s moves one code per tick; check the unit (V/ms or V/s)", number(code / period)),
         );
@@ -69,14 +67,10 @@ pub(super) fn stroke_fits_gain(f: &Fields, findings: &mut Findings) -> Option<()
         return Some(());
     }
     let (key, span) = ("actuator.stroke", f.span("actuator.stroke"));
-    let message = format!(
-        "{} stacks of {} um/V over {} V give {} um, but the stroke is {} um",
-        number(stacks),
-        number(gain * 1e6),
-        number(high - low),
-        number(travel * 1e6),
-        number(stroke * 1e6)
-    );
+    let [count, per_volt, volts, sum] = [stacks, gain * 1e6, high - low, travel * 1e6].map(number);
+    let declared = number(stroke * 1e6);
+    let message =
+        format!("{count} stacks of {per_volt} um/V over {volts} V give {sum} um, but the stroke is {declared} um");
     let check = "check figures and units of `actuator.stacks`, `actuator.stack_gain` (of one stack, not of the leg), `actuator.voltage` and `actuator.stroke`";
     if (1.0 / LARGEST_MISMATCH..=LARGEST_MISMATCH).contains(&ratio) {
         findings.add(codes::STROKE_MISMATCH, key, span, message, check.to_owned());
@@ -92,15 +86,12 @@ pub(super) fn resonance_below_tick_rate(f: &Fields, findings: &mut Findings) -> 
     let modes = (0..f.count("mode")).map(|index| format!("mode[{index}].frequency"));
     for path in ["actuator.resonance".to_owned()].into_iter().chain(modes) {
         let Some(resonance) = f.number(&path).filter(|resonance| resonance * period > 0.5) else { continue };
+        let [hertz, half] = [resonance, 1.0 / period].map(number);
         findings.add(
             codes::RESONANCE_ALIASED,
             &path,
             f.span(&path),
-            format!(
-                "the resonance at {} Hz is above half the tick rate of {} Hz",
-                number(resonance),
-                number(1.0 / period)
-            ),
+            format!("the resonance at {hertz} Hz is above half the tick rate of {half} Hz"),
             format!("with a period below {} us the gauges could measure it", number(0.5e6 / resonance)),
         );
     }
@@ -115,15 +106,12 @@ pub(super) fn sensor_fits(f: &Fields, findings: &mut Findings) -> Option<()> {
     }
     let path = "sensor.range";
     if low > 0.0 || high < 0.0 {
+        let [from, to] = [low * 1e6, high * 1e6].map(number);
         findings.add(
             codes::SENSOR_RANGE,
             path,
             f.span(path),
-            format!(
-                "the gauge's range of {} um to {} um leaves out 0, the displacement at rest",
-                number(low * 1e6),
-                number(high * 1e6)
-            ),
+            format!("the gauge's range of {from} um to {to} um leaves out 0, the displacement at rest"),
             "give the range as displacement of the leg from rest".to_owned(),
         );
     }
@@ -141,16 +129,12 @@ pub(super) fn sensor_fits(f: &Fields, findings: &mut Findings) -> Option<()> {
     let noise = f.number("sensor.noise")?;
     let seen = f.number("actuator.stroke").filter(|stroke| *stroke < span).unwrap_or(span);
     if noise > LARGEST_NOISE * seen {
+        let [rms, share, signal] = [noise * 1e9, noise / seen, seen * 1e6].map(number);
         findings.add(
             codes::SENSOR_NOISE,
             "sensor.noise",
             f.span("sensor.noise"),
-            format!(
-                "a noise of {} nm rms is {} of the signal of {} um",
-                number(noise * 1e9),
-                number(noise / seen),
-                number(seen * 1e6)
-            ),
+            format!("a noise of {rms} nm rms is {share} of the signal of {signal} um"),
             "check the unit, nm or um: gauges of piezo platforms have 0.1 nm to about 10 nm".to_owned(),
         );
     }

@@ -50,15 +50,12 @@ pub(super) fn mass_centers_inside_leg(f: &Fields, findings: &mut Findings) -> Op
             continue;
         };
         if center >= length {
+            let [distance, long] = [center * 1e3, length * 1e3].map(number);
             findings.add(
                 codes::CENTER_OUTSIDE_LEG,
                 path,
                 f.span(path),
-                format!(
-                    "`{path}` is {} mm from the {joint} joint, but a leg is only {} mm long at rest",
-                    number(center * 1e3),
-                    number(length * 1e3)
-                ),
+                format!("`{path}` is {distance} mm from the {joint} joint, but a leg is only {long} mm long at rest"),
                 format!("give less than {} mm, or fix [geometry]", number(length * 1e3)),
             );
         }
@@ -76,16 +73,13 @@ pub(super) fn leg_gyration(f: &Fields, findings: &mut Findings) -> Option<()> {
         let radius = (inertia / mass).sqrt();
         // A rod as long as the leg has 0.29 of its length.
         if radius > length || radius < length * 1e-3 {
+            let [gyration, kilograms, moment, long] = [radius * 1e3, mass, inertia, length * 1e3].map(number);
             findings.add(
                 codes::GYRATION,
                 &path,
                 f.span(&path),
                 format!(
-                    "the {part} part of a leg has a radius of gyration of {} mm (from {} kg and {} kg m^2), but a leg is {} mm long",
-                    number(radius * 1e3),
-                    number(mass),
-                    number(inertia),
-                    number(length * 1e3)
+                    "the {part} part of a leg has a radius of gyration of {gyration} mm (from {kilograms} kg and {moment} kg m^2), but a leg is {long} mm long"
                 ),
                 format!("check the units of `{path}` and `leg.{part}_mass`: kg or g, mm^2 or m^2"),
             );
@@ -129,10 +123,9 @@ pub(super) fn platform_gyration(f: &Fields, findings: &mut Findings) -> Option<(
     if SOUND.contains(&ratio) {
         return Some(());
     }
+    let [gyration, joints] = [largest, size].map(number);
     let message = format!(
-        "mass and inertia give a radius of gyration of {} m, but the platform's joint circle has a radius of {} m",
-        number(largest),
-        number(size)
+        "mass and inertia give a radius of gyration of {gyration} m, but the platform's joint circle has a radius of {joints} m"
     );
     let help = "check the units of `platform.mass` (kg or g) and `platform.inertia` (mm^2 or m^2)".to_owned();
     let (path, span) = ("platform.mass", f.span("platform.mass"));

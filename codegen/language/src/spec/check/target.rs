@@ -10,16 +10,13 @@ pub(super) fn scalar_fits_fpu(f: &Fields, findings: &mut Findings) -> Option<()>
     let part = Mcu::named(f.choice("target.mcu")?)?.part();
     if !part.double && f.choice("controller.scalar")? == "f64" {
         let path = if f.given("target.mcu") { "target.mcu" } else { "controller.scalar" };
+        let (name, core) = (&part.name, part.core);
+        let by_default = if f.given("controller.scalar") { "" } else { " by default" };
         findings.add(
             codes::SCALAR_WITHOUT_FPU,
             path,
             f.span(path),
-            format!(
-                "the FPU of {} ({}) has single precision, but controller.scalar is \"f64\"{}",
-                part.name,
-                part.core,
-                if f.given("controller.scalar") { "" } else { " by default" }
-            ),
+            format!("the FPU of {name} ({core}) has single precision, but controller.scalar is \"f64\"{by_default}"),
             format!(
                 "write, in [controller]: scalar = \"f32\"; or choose mcu = \"{}\"",
                 Mcu::doubles().join("\" or \"")

@@ -105,15 +105,12 @@ pub(super) fn inside_workspace(f: &Fields, findings: &mut Findings) -> Option<()
             if let Some(value) = f.number(path)
                 && value.abs() > bound
             {
+                let [given, most] = [value * 1e6, bound * 1e6].map(number);
                 findings.add(
                     codes::TRIGGER_OUTSIDE,
                     path,
                     f.span(path),
-                    format!(
-                        "{} {unit} is outside the workspace of {} {unit} along {axis}",
-                        number(value * 1e6),
-                        number(bound * 1e6)
-                    ),
+                    format!("{given} {unit} is outside the workspace of {most} {unit} along {axis}"),
                     format!(
                         "positions count from rest, including the bias: write \"{} {unit}\", or widen `workspace.{}`",
                         number(if value < 0.0 { -bound } else { bound } * 1e6),

@@ -64,11 +64,9 @@ fn compare(recorded: &[Edge], seen: &[Edge], [begin, end]: [i64; 2]) -> Result<u
             best = Some(wrong);
         }
     }
+    let (all, found, in_order) = (recorded.len(), seen.len(), best.unwrap_or(0));
     Err(format!(
-        "the pins of triggers are not those of the record: {} edges recorded, {} seen, {} of them in order",
-        recorded.len(),
-        seen.len(),
-        best.unwrap_or(0)
+        "the pins of triggers are not those of the record: {all} edges recorded, {found} seen, {in_order} of them in order"
     ))
 }
 

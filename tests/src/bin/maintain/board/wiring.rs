@@ -32,12 +32,8 @@ pub fn run(trial: &Trial) -> Result<(), String> {
     host.order("arm\nwait holding 600\nstatus", ": holding")?;
     host.order("ramp-down\nwait disarmed 600\nstatus", ": disarmed")?;
     let report = session.report()?;
-    println!(
-        "{}: {} faults of the wiring refused and named, then armed without one; {}",
-        trial.target,
-        faults.len(),
-        report.text
-    );
+    let (target, count, text) = (trial.target, faults.len(), &report.text);
+    println!("{target}: {count} faults of the wiring refused and named, then armed without one; {text}");
     match report.violations.first() {
         Some(text) => Err(format!("{}: against a data sheet: {text}", trial.target)),
         None => Ok(()),

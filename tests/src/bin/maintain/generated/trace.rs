@@ -63,15 +63,11 @@ pub fn markdown(root: &Path) -> Result<String, String> {
             }
         }
         // Writing to a String cannot fail.
-        let _ = writeln!(
-            text,
-            "| {} | {} | {} | {} | {} |",
-            named(equation),
-            keys.get(&index).map_or_else(String::new, |keys| keys.iter().cloned().collect::<Vec<_>>().join(", ")),
-            places(&code),
-            lines(&of(&emitted, false)),
-            places(&tests),
-        );
+        let equation = named(equation);
+        let keys =
+            keys.get(&index).map_or_else(String::new, |keys| keys.iter().cloned().collect::<Vec<_>>().join(", "));
+        let (code, emitted, tests) = (places(&code), lines(&of(&emitted, false)), places(&tests));
+        let _ = writeln!(text, "| {equation} | {keys} | {code} | {emitted} | {tests} |");
     }
     if missing.is_empty() { Ok(text) } else { Err(missing.join("\n")) }
 }

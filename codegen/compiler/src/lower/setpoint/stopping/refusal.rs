@@ -27,12 +27,10 @@ pub(super) fn too_long(
     } else {
         to_standstill
     };
+    let (what, axis, speed) = (&stop.what, AXES[worst], amount(worst, stop.speed[worst]));
+    let end = amount(worst, room[worst]);
     let message = format!(
-        "a {} along {} that is stopped at {}/s continues for {coasted}, but workspace and strokes end at most {} from the bias pose",
-        stop.what,
-        AXES[worst],
-        amount(worst, stop.speed[worst]),
-        amount(worst, room[worst])
+        "a {what} along {axis} that is stopped at {speed}/s continues for {coasted}, but workspace and strokes end at most {end} from the bias pose"
     );
     let slower = down(stop.speed[worst] / excess(worst) * 1e6);
     let unit = if worst < 3 { "um" } else { "urad" };
