@@ -1,7 +1,7 @@
 //! `specgen export` as a user runs it: the header is C11 and C++17 without a warning, and programs in C and Python give the digest of
 //! the same library under Rust, after as many ticks.
 
-use std::process::Command;
+use std::process::{Command, Stdio};
 
 use crate::support::{Folder, length, skipped};
 use host_sim::controller::{Controller, Supervised, TickController};
@@ -113,6 +113,10 @@ fn a_module_in_python_steps_the_controller_and_gets_its_bits() {
             String::from_utf8_lossy(&ran.stderr)
         );
         assert!(text.contains("mode is out of its range") && text.contains("modus: expected one of mode, "), "{text}");
+        // The line that is printed, without an input.
+        let line = run.stdout.lines().map(str::trim).find(|line| line.starts_with("python3 ")).unwrap();
+        let shell = Command::new("sh").args(["-c", line]).current_dir(folder.path(dir)).stdin(Stdio::null()).output();
+        assert!(shell.unwrap().status.success(), "{line}");
         // The library of another spec is refused.
         let module = folder.read(&format!("{dir}/controller.py"));
         let other = module.replace("DIGEST = \"", "DIGEST = \"0");

@@ -44,6 +44,7 @@ const LINES: &[(&str, &[(&str, &str)])] = &[
     ("specgen export c", &[("spec", "legs.toml"), ("output", "c")]),
     ("specgen export python", &[("spec", "legs.toml"), ("output", "python")]),
     ("specgen export fmu", &[("spec", "legs.toml"), ("output", "fmu")]),
+    ("specgen export table", &[("table", "r.csv"), ("output", "r.npz")]),
     ("specgen identify", &[("records", "r.csv"), ("drive", "0:100"), ("grid", "4")]),
     ("specgen identify linear", &[("records", "sine.csv")]),
     ("specgen identify response", &[("record", "r.csv")]),

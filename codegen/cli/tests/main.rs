@@ -1,6 +1,7 @@
 //! Tests of the command and the compiler from a user's view, in one binary: a module for each subject.
 #![allow(clippy::unwrap_used, clippy::panic)] // Helpers of tests, where a panic is a failed test.
 
+mod arrays;
 mod assumed;
 #[path = "../../../tests/tests/board_support/mod.rs"]
 mod board_support;

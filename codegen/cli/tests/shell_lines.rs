@@ -28,6 +28,7 @@ const BUILT: &[(&str, usize, &str)] = &[
     ("codegen/studies/src/trajectory.rs", 1, "a_machine_is_run_again_by_its_line"),
     ("codegen/report/src/robust/work.rs", 1, "a_machine_is_run_again_by_its_line"),
     ("codegen/language/src/ui.rs", 1, "next_commands_name_the_files_that_were_named"),
+    ("codegen/report/src/identify/everett.rs", 1, "a_record_alone_is_described_with_the_line_that_identifies_it"),
     ("codegen/identify/src/coverage.rs", 1, "a_drive_is_written_beside_the_record"),
     ("codegen/language/src/spec/source.rs", 1, "specs_in_other_encodings_become_text_and_stay"),
 ];
@@ -204,6 +205,31 @@ fn a_drive_is_written_beside_the_record() {
     let mut after = files(&folder);
     assert!(after.remove("drive-2.csv").is_some_and(|made| !made.is_empty()));
     assert_eq!(after, before);
+}
+
+#[test]
+fn a_record_alone_is_described_with_the_line_that_identifies_it() {
+    for &name in length(&NAMES[2..4], &NAMES) {
+        let folder = Folder::new();
+        let record = format!("{name}.csv");
+        fs::copy(folder.path("records/leg1.csv"), folder.path(&record)).unwrap();
+        let (code, text) = run(&folder, &["identify"], &record, &["--grid", "4"]);
+        let lines = printed(&text, "specgen");
+        assert!(code == 2 && lines.len() == 1 && text.contains("samples in"), "{text}");
+        let output = shell(&folder, &lines[0]);
+        assert!(output.status.success(), "{}: {output:?}", lines[0]);
+    }
+    // A physical reason comes before the question for a range.
+    let folder = Folder::new();
+    let rows: String = (0..400)
+        .map(|k| {
+            let drive = f64::from((k % 160 - 80_i32).abs()) - 40.0;
+            format!("{},{drive},{}\n", f64::from(k) * 1e-3, 0.1 * (drive - 5.0).abs() + 1e-3 * drive)
+        })
+        .collect();
+    folder.write("butterfly.csv", format!("time_s,drive_V,displacement_um\n{rows}"));
+    let (code, text) = run(&folder, &["identify"], "butterfly.csv", &[]);
+    assert!(code == 1 && text.contains("butterfly"), "{text}");
 }
 
 /// Suggested next commands contain the name as one word.

@@ -14,6 +14,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 use std::io::{self, Read};
 
+use super::columns::names::quantity;
 use super::tables::{Extent, listed};
 use specgen_language::files::MAX_BYTES as LARGEST;
 
@@ -37,6 +38,8 @@ struct Contents {
     arrays: Vec<Array>,
     /// Name and kind of everything else.
     others: Vec<(String, String)>,
+    /// Comments of a table that specgen wrote.
+    comment: Option<String>,
 }
 
 /// Tables of a file, and what is in none of them.
@@ -44,6 +47,8 @@ pub(crate) struct Tables {
     pub(crate) tables: Vec<Table>,
     /// Names, each with what it is.
     pub(crate) left_out: Vec<String>,
+    /// Comments for the lines of any of the tables.
+    pub(crate) comment: Option<String>,
 }
 
 /// Columns of equal length.
@@ -66,6 +71,8 @@ pub(crate) enum Kind {
     Tdms,
     /// An array of NumPy.
     Npy,
+    /// A ZIP archive of arrays of NumPy.
+    Npz,
 }
 
 /// Columns of a matrix from here on are an image, not channels.
@@ -73,7 +80,7 @@ const WIDEST: usize = 64;
 
 impl Kind {
     /// Bytes that tell.
-    pub(crate) const TELLING: usize = 19;
+    pub(crate) const TELLING: usize = 128;
 
     /// Of a file that begins with `first`.
     pub(crate) fn of(first: &[u8]) -> Option<Self> {
@@ -84,6 +91,9 @@ impl Kind {
             (b"TDSm", Self::Tdms),
             (b"\x93NUMPY", Self::Npy),
         ];
+        if npy::is_archive(first) {
+            return Some(Self::Npz);
+        }
         kinds.into_iter().find(|(magic, _)| first.starts_with(magic)).map(|(_, kind)| kind)
     }
 
@@ -95,6 +105,7 @@ impl Kind {
             Self::Hdf5 => "an HDF5 file",
             Self::Tdms => "a TDMS file of LabVIEW",
             Self::Npy => "an array of NumPy",
+            Self::Npz => "a file of arrays of NumPy",
         }
     }
 
@@ -108,6 +119,7 @@ impl Kind {
             Self::Mat73 | Self::Hdf5 => hdf5::contents(file),
             Self::Tdms => tdms::contents(&file),
             Self::Npy => npy::contents(&file),
+            Self::Npz => npy::of_archive(&file),
         };
         let found = tables(contents.map_err(|error| format!("cannot be read: {error}"))?);
         if !found.tables.is_empty() {
@@ -116,6 +128,11 @@ impl Kind {
         let there = if found.left_out.is_empty() { "nothing".to_owned() } else { listed(&found.left_out) };
         Err(format!("has no two arrays of numbers of one length for the columns, but {there}"))
     }
+}
+
+/// Whether an array is called as a time.
+fn is_time(name: &str) -> bool {
+    quantity("time_s").is_some_and(|time| time.fits(name).is_some() || time.is_named(name))
 }
 
 /// Number of samples and of columns of an array of one or two dimensions.
@@ -128,7 +145,8 @@ fn length_and_width(size: &[usize]) -> Option<[usize; 2]> {
     }
 }
 
-/// Puts arrays of equal length together: of the whole file if their names differ, otherwise of each group. Matrices
+/// Puts arrays of equal length together: of the whole file if their names differ and only one group has times, otherwise
+/// of each group. Matrices
 /// without a vector beside them are a table each.
 fn tables(contents: Contents) -> Tables {
     let mut left_out: Vec<String> = Vec::new();
@@ -148,9 +166,11 @@ fn tables(contents: Contents) -> Tables {
     for same in of_length.into_values() {
         let mut names = BTreeSet::new();
         let is_unique = same.iter().all(|one| names.insert(one.array.name.clone()));
+        let timed = same.iter().filter(|one| is_time(&one.array.name)).map(|one| &one.array.group);
+        let is_one = is_unique && timed.collect::<BTreeSet<_>>().len() < 2;
         let mut groups: BTreeMap<String, Vec<Channels>> = BTreeMap::new();
         for one in same {
-            groups.entry(if is_unique { String::new() } else { one.array.group.clone() }).or_default().push(one);
+            groups.entry(if is_one { String::new() } else { one.array.group.clone() }).or_default().push(one);
         }
         for group in groups.into_values() {
             if group.iter().all(|one| one.width > 1) {
@@ -171,7 +191,7 @@ fn tables(contents: Contents) -> Tables {
             .map(|(name, values)| format!("`{name}` ({} numbers)", values.len())),
     );
     tables.retain(|table| !is_single(table));
-    Tables { tables, left_out }
+    Tables { tables, left_out, comment: contents.comment }
 }
 
 /// An array of one or two dimensions as columns.
@@ -227,14 +247,16 @@ impl Table {
     }
 
     /// The lines of a text.
-    pub(crate) fn lines(self) -> Lines {
+    pub(crate) fn lines(self, comment: Option<String>) -> Lines {
         // A separator or a quotation mark must not occur in a name, nor a name be a number.
         let plain = |name: &str| match name.replace(['\t', '\n', '\r', '"'], " ") {
             number if number.trim().parse::<f64>().is_ok() => format!("column {number}"),
             name => name,
         };
         let names: Vec<String> = self.columns.iter().map(|(name, _)| plain(name)).collect();
-        Lines { columns: self.columns, next: 0, line: (names.join("\t") + "\n").into_bytes(), taken: 0 }
+        let comment: String = comment.iter().flat_map(|text| text.lines()).map(|line| format!("# {line}\n")).collect();
+        let head = format!("{}\n{comment}", names.join("\t"));
+        Lines { columns: self.columns, next: 0, line: head.into_bytes(), taken: 0 }
     }
 }
 

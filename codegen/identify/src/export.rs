@@ -31,7 +31,12 @@ pub(crate) fn write_nodes(table: &EverettTable, header: &str) -> String {
 /// Whether a data file is a table as [`write_table_csv`] writes it, by its first line.
 #[must_use]
 pub fn is_table_csv(text: &str) -> bool {
-    text.lines().next() == Some(HEADER)
+    text.lines().next().is_some_and(|first| is_header(first, HEADER))
+}
+
+/// Whether a line has these names. Files of arrays give them with tabs.
+fn is_header(line: &str, header: &str) -> bool {
+    line.trim().replace('\t', ",") == header
 }
 
 /// Reads the text of [`write_table_csv`]; node values are equal within rounding of the unit. `shown_as` names the file
@@ -60,7 +65,7 @@ pub(crate) fn read_nodes(
     findings: &mut Findings,
 ) -> Option<(EverettTable, LineNumbers)> {
     let [message, help] = line;
-    if text.lines().next().is_none_or(|first| first.trim() != header) {
+    if !text.lines().next().is_some_and(|first| is_header(first, header)) {
         return findings.refuse(code, Some(1), format!("the header must be `{header}`"), help);
     }
     let format = Format {

@@ -9,9 +9,9 @@ use std::path::Path;
 use flate2::read::MultiGzDecoder;
 
 use super::columns::{self, Part, foreign, names};
-use super::container::{Kind, Table};
+use super::container::{Kind, Lines, Table};
 use super::findings::Findings;
-use super::tables::{self, Extent};
+use super::tables::{self, Choice, Extent};
 use specgen_language::diagnostic::{Diagnostic, codes};
 pub use specgen_language::files::MAX_BYTES as MAX_FILE_BYTES;
 use specgen_language::files::{self, ReadError};
@@ -20,18 +20,19 @@ use specgen_language::files::{self, ReadError};
 pub(crate) struct Source<'a> {
     pub(crate) lines: Box<dyn Read + 'a>,
     pub(crate) part: Part,
+    pub(crate) choice: Choice,
 }
 
 impl<'a> Source<'a> {
     /// A text that has one table.
     pub(crate) fn whole(lines: impl Read + 'a) -> Self {
-        Self { lines: Box::new(lines), part: Part::WHOLE }
+        Self { lines: Box::new(lines), part: Part::WHOLE, choice: Choice::default() }
     }
 
     /// A text, and the table `series` of it, or else the longest; `None` after the problem was reported.
     pub(crate) fn of_text(text: &'a [u8], series: Option<&str>, findings: &mut Findings) -> Option<Self> {
-        let part = part(text, series, findings)?;
-        Some(Self { lines: Box::new(text), part })
+        let (part, choice) = part(text, series, findings)?;
+        Some(Self { lines: Box::new(text), part, choice })
     }
 
     /// A table of a file in memory.
@@ -39,11 +40,12 @@ impl<'a> Source<'a> {
         let text = match unpacked(file, findings)? {
             Unpacked::Text(text) => text,
             Unpacked::Tables(kind, file) => {
-                return Some(Source::whole(table(kind, file, series, findings)?.lines()));
+                let (lines, choice) = table(kind, file, series, findings)?;
+                return Some(Source { choice, ..Source::whole(lines) });
             }
         };
-        let part = part(&text[..], series, findings)?;
-        Some(Source { lines: Box::new(Cursor::new(text)), part })
+        let (part, choice) = part(&text[..], series, findings)?;
+        Some(Source { lines: Box::new(Cursor::new(text)), part, choice })
     }
 }
 
@@ -56,17 +58,17 @@ enum Unpacked {
 }
 
 /// The table of a text that is read.
-fn part(text: impl Read, series: Option<&str>, findings: &mut Findings) -> Option<Part> {
+fn part(text: impl Read, series: Option<&str>, findings: &mut Findings) -> Option<(Part, Choice)> {
     let (parts, extents): (Vec<Part>, Vec<Extent>) = columns::tables(text).into_iter().unzip();
     // What has no table is refused when it is read.
     if parts.len() < 2 && series.is_none() {
-        return Some(parts.first().copied().unwrap_or(Part::WHOLE));
+        return Some((parts.first().copied().unwrap_or(Part::WHOLE), Choice::default()));
     }
-    tables::choose(&extents, is_record, &[], series, findings).map(|chosen| parts[chosen])
+    tables::choose(&extents, is_record, &[], series, findings).map(|chosen| (parts[chosen.table], chosen))
 }
 
 /// The table of a binary file that is read.
-fn table(kind: Kind, file: Vec<u8>, series: Option<&str>, findings: &mut Findings) -> Option<Table> {
+fn table(kind: Kind, file: Vec<u8>, series: Option<&str>, findings: &mut Findings) -> Option<(Lines, Choice)> {
     let found = kind.tables(file).map_err(|why| {
         let message = format!("is {} and {why}", kind.name());
         findings.add(codes::RECORD_NOT_TEXT, None, message, "save time, drive and displacement as arrays of numbers");
@@ -74,7 +76,7 @@ fn table(kind: Kind, file: Vec<u8>, series: Option<&str>, findings: &mut Finding
     let mut found = found.ok()?;
     let extents: Vec<Extent> = found.tables.iter().map(Table::extent).collect();
     let chosen = tables::choose(&extents, is_record, &found.left_out, series, findings)?;
-    Some(found.tables.swap_remove(chosen))
+    Some((found.tables.swap_remove(chosen.table).lines(found.comment), chosen))
 }
 
 /// Whether a table has names of a record.
@@ -152,7 +154,7 @@ fn read_text(path: &Path, findings: &mut Findings) -> Option<String> {
         Unpacked::Text(text) => text,
         Unpacked::Tables(kind, file) => {
             let mut text = Vec::new();
-            let lines = table(kind, file, None, findings)?.lines();
+            let (lines, _) = table(kind, file, None, findings)?;
             if !findings.is_empty() {
                 let message = "has several tables, or parts that are no numbers".to_owned();
                 let help = "save one table as CSV, or the table that `specgen identify RECORD -o table.csv` makes";
@@ -199,9 +201,9 @@ pub(crate) fn open_file(path: &Path, series: Option<&str>, findings: &mut Findin
             }
         };
     }
-    let part = part(&file, series, findings)?;
+    let (part, choice) = part(&file, series, findings)?;
     file.rewind().map_err(|error: io::Error| unreadable(&error.into(), findings)).ok()?;
-    Some(Source { lines: Box::new(file), part })
+    Some(Source { lines: Box::new(file), part, choice })
 }
 
 fn unreadable(unread: &ReadError, findings: &mut Findings) {

@@ -88,7 +88,7 @@ fn checked(source: Source, wanted: &[ColumnSpec], reading: &Reading, findings: &
 
 /// The `wanted` columns without any check of their values; `None` after every problem of the header was reported.
 pub(crate) fn columns_of(
-    Source { lines, part }: Source,
+    Source { lines, part, choice }: Source,
     wanted: &[ColumnSpec],
     reading: &Reading,
     findings: &mut Findings,
@@ -118,7 +118,7 @@ pub(crate) fn columns_of(
     }
     let mut signals = Signals { shown_as: findings.path().to_owned(), lines, columns, simulated, warnings: Vec::new() };
     if let (TIME, Some(Some(time)), false) = (wanted[0].name, signals.columns.first(), findings.any_error())
-        && let Some(stretch) = stretches::longest(time, findings)
+        && let Some(stretch) = stretches::chosen(time, choice, findings)
     {
         signals.lines = signals.lines.part(stretch.clone());
         signals.columns.iter_mut().flatten().for_each(|column| *column = column[stretch.clone()].to_vec());

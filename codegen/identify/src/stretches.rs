@@ -5,6 +5,7 @@ use std::ops::Range;
 
 use super::findings::Findings;
 use super::statistics::median;
+use super::tables::Choice;
 use specgen_language::diagnostic::codes;
 
 /// A sampling interval this many times the median is a gap: a reversal may be hidden in it.
@@ -14,9 +15,9 @@ const LEAST: usize = 100;
 /// Stretches that a note names.
 const NAMED: usize = 4;
 
-/// The longest stretch of rising `time` (s) without gaps, with a note of what is left out; `None` if there is only one, or
-/// none is long enough.
-pub(crate) fn longest(time: &[f64], findings: &mut Findings) -> Option<Range<usize>> {
+/// The stretch of rising `time` (s) without gaps that the user chose, or else the longest, with a note of what is left out;
+/// `None` if there is only one, or none is long enough, or after a choice that is not there was reported.
+pub(crate) fn chosen(time: &[f64], choice: Choice, findings: &mut Findings) -> Option<Range<usize>> {
     let mut intervals: Vec<f64> = time.windows(2).map(|w| w[1] - w[0]).collect();
     let gap = GAP * median(&mut intervals);
     let breaks = time.windows(2).enumerate().filter(|(_, w)| (w[1] - w[0]).abs() > gap).map(|(k, _)| k + 1);
@@ -28,15 +29,35 @@ pub(crate) fn longest(time: &[f64], findings: &mut Findings) -> Option<Range<usi
     }
     // The first of equals.
     let longest = stretches.iter().rev().max_by_key(|stretch| stretch.len())?.clone();
+    let shown = |stretch: &Range<usize>| format!("{} s to {} s", time[stretch.start], time[stretch.end - 1]);
     // A time that is wrong looks like a run of a few samples.
     let is_wrong = |pair: &[Range<usize>]| {
         time[pair[1].start] < time[pair[0].end - 1] && pair.iter().any(|stretch| stretch.len() < LEAST)
     };
-    if gap <= 0.0 || stretches.len() < 2 || longest.len() < LEAST || stretches.windows(2).any(is_wrong) {
+    let is_whole = gap <= 0.0 || stretches.len() < 2 || longest.len() < LEAST || stretches.windows(2).any(is_wrong);
+    if is_whole {
+        stretches.truncate(1);
+    }
+    let listed = |(k, stretch): (usize, &Range<usize>)| format!("{} ({})", choice.series_of(k + 1), shown(stretch));
+    if let Some(number) = choice.stretch {
+        return match stretches.get(number - 1) {
+            Some(stretch) => Some(stretch.clone()).filter(|_| !is_whole),
+            None => {
+                let all: Vec<String> = stretches.iter().enumerate().take(NAMED).map(listed).collect();
+                let message = format!(
+                    "`--series` names stretch {number} between gaps in time; the table has {}",
+                    if is_whole { "one".to_owned() } else { all.join(", ") }
+                );
+                let help = "name one of them, or none for the longest";
+                findings.refuse(codes::RECORD_HEADER, None, message, help)
+            }
+        };
+    }
+    if is_whole {
         return None;
     }
-    let shown = |stretch: &Range<usize>| format!("{} s to {} s", time[stretch.start], time[stretch.end - 1]);
-    let others: Vec<String> = stretches.iter().filter(|other| **other != longest).map(&shown).collect();
+    let others = stretches.iter().enumerate().filter(|(_, other)| **other != longest);
+    let others: Vec<String> = others.map(listed).collect();
     let more = others.len().saturating_sub(NAMED);
     let more = if more > 0 { format!(" and {more} more") } else { String::new() };
     let message = format!(
@@ -45,7 +66,15 @@ pub(crate) fn longest(time: &[f64], findings: &mut Findings) -> Option<Range<usi
         longest.len(),
         others[..others.len().min(NAMED)].join(", ")
     );
-    findings.add(codes::RECORD_PART, None, message, "record without gaps, one run in each file");
+    let next = stretches
+        .iter()
+        .enumerate()
+        .filter(|(_, other)| **other != longest)
+        .rev()
+        .max_by_key(|(_, stretch)| stretch.len());
+    let next = next.map_or_else(String::new, |(k, _)| choice.series_of(k + 1));
+    let help = format!("`--series {next}` reads another stretch; record without gaps, one run in each file");
+    findings.add(codes::RECORD_PART, None, message, &help);
     Some(longest)
 }
 
@@ -55,7 +84,7 @@ mod tests {
 
     fn found(time: &[f64]) -> (Option<Range<usize>>, usize) {
         let mut findings = Findings::new("r.csv");
-        let found = longest(time, &mut findings);
+        let found = chosen(time, Choice::default(), &mut findings);
         (found, findings.into_diagnostics().len())
     }
 

@@ -16,6 +16,24 @@ pub(crate) struct Extent {
     pub(crate) first_line: Option<usize>,
 }
 
+/// What the user chose of a file by `--series`: a table, a stretch of it between gaps, or both, as in `2.3`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(crate) struct Choice {
+    /// Index of the table.
+    pub(crate) table: usize,
+    /// Whether there are other tables.
+    pub(crate) is_one_of: bool,
+    /// Number of the stretch, from 1; the longest if none.
+    pub(crate) stretch: Option<usize>,
+}
+
+impl Choice {
+    /// The value of `--series` that chooses a stretch of the table.
+    pub(crate) fn series_of(self, stretch: usize) -> String {
+        if self.is_one_of { format!("{}.{stretch}", self.table + 1) } else { stretch.to_string() }
+    }
+}
+
 /// Most items of a list in a message.
 const LISTED: usize = 8;
 
@@ -37,7 +55,7 @@ impl Extent {
     }
 }
 
-/// Index of the table that is read: `series`, a name or a number from 1, or else the longest. `is_known`: whether its
+/// The table that is read: `series`, a name or a number from 1, or else the longest; and the stretch of it. `is_known`: whether its
 /// names are those of a record. A note has the others, and what was left out. `None` after the problem was reported.
 pub(crate) fn choose(
     all: &[Extent],
@@ -45,15 +63,23 @@ pub(crate) fn choose(
     left_out: &[String],
     series: Option<&str>,
     findings: &mut Findings,
-) -> Option<usize> {
+) -> Option<Choice> {
+    let is_one_of = all.len() > 1;
+    let whole = |table| Choice { table, is_one_of, stretch: None };
     let words = |but: Option<usize>| -> Vec<String> {
         let others = all.iter().enumerate().filter(|(index, _)| Some(*index) != but);
         others.map(|(index, table)| table.in_words(index)).collect()
     };
     if let Some(series) = series {
         let named = all.iter().position(|table| table.name.eq_ignore_ascii_case(series.trim()));
-        let numbered = || series.trim().parse::<usize>().ok()?.checked_sub(1).filter(|index| *index < all.len());
-        return named.or_else(numbered).or_else(|| {
+        let number = |text: &str| text.parse::<usize>().ok().filter(|number| *number > 0);
+        let numbered = || match series.trim().split_once('.') {
+            Some((table, stretch)) => Some(Choice { stretch: Some(number(stretch)?), ..whole(number(table)? - 1) }),
+            None if is_one_of => Some(whole(number(series.trim())? - 1)),
+            None => Some(Choice { stretch: Some(number(series.trim())?), ..whole(0) }),
+        };
+        let numbered = || numbered().filter(|choice| choice.table < all.len());
+        return named.map(whole).or_else(numbered).or_else(|| {
             let message = format!("`--series` names `{series}`; the file has {}", listed(&words(None)));
             findings.refuse(codes::RECORD_HEADER, None, message, "name a table of the file by its name or number")
         });
@@ -62,7 +88,7 @@ pub(crate) fn choose(
     let chosen =
         all.iter().enumerate().rev().max_by_key(|(_, table)| (is_known(table), table.rows)).map(|(index, _)| index)?;
     let mut parts = Vec::new();
-    if all.len() > 1 {
+    if is_one_of {
         parts.push(format!(
             "table {} is read; not read: {}",
             all[chosen].in_words(chosen),
@@ -73,11 +99,14 @@ pub(crate) fn choose(
         parts.push(format!("left out: {}", listed(left_out)));
     }
     if !parts.is_empty() {
-        let help =
-            if all.len() > 1 { "`--series N` reads another table" } else { "check that the record needs none of them" };
-        findings.add(codes::RECORD_PART, None, parts.join("; "), help);
+        let help = if is_one_of {
+            format!("`--series {}` reads another table", if chosen == 0 { 2 } else { 1 })
+        } else {
+            "check that the record needs none of them".to_owned()
+        };
+        findings.add(codes::RECORD_PART, None, parts.join("; "), &help);
     }
-    Some(chosen)
+    Some(whole(chosen))
 }
 
 #[cfg(test)]
@@ -96,15 +125,17 @@ mod tests {
         let choose = |series: Option<&str>| {
             let mut findings = Findings::new("r.csv");
             let found = choose(&all, |_| false, &["`s` (a text)".to_owned()], series, &mut findings);
+            let found = found.map(|choice| (choice.table, choice.stretch));
             (found, findings.into_diagnostics())
         };
         let (found, notes) = choose(None);
-        assert_eq!((found, notes[0].code), (Some(1), codes::RECORD_PART.id));
+        assert_eq!((found, notes[0].code), (Some((1, None)), codes::RECORD_PART.id));
         for word in ["table 2 `20 Hz` (500 rows of `a` from line 8)", "3 `40 Hz`", "left out: `s` (a text)"] {
             assert!(notes[0].message.contains(word), "{}", notes[0].message);
         }
-        assert_eq!(choose(Some("3")), (Some(2), Vec::new()));
-        assert_eq!(choose(Some("40 hz")), (Some(2), Vec::new()));
+        assert_eq!(choose(Some("3")), (Some((2, None)), Vec::new()));
+        assert_eq!(choose(Some("2.4")), (Some((1, Some(4))), Vec::new()));
+        assert_eq!(choose(Some("40 hz")), (Some((2, None)), Vec::new()));
         let (found, refused) = choose(Some("4"));
         assert!(
             found.is_none() && refused[0].code == codes::RECORD_HEADER.id && refused[0].message.contains("1 `R, C`"),

@@ -10,6 +10,7 @@
 //! The one crate that reads TOML. What every later crate needs is here, too: [`files`], [`output`], [`interrupt`] and [`lock`] to read
 //! and write files, [`outcome`], [`ui`] and [`table`] for the results of commands, [`editor`] for what editors ask, [`shell`] for lines of a shell in messages.
 
+pub mod arrays;
 pub mod diagnostic;
 pub mod editor;
 pub mod files;

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use tempfile::NamedTempFile;
 
+use crate::arrays::Form;
 use crate::files::{self, Destination, OutputError, ReadError};
 use crate::interrupt::{self, Guard, ResultFolders};
 use crate::lock;
@@ -99,9 +100,12 @@ pub fn refused_output(path: &Path, why: &OutputError) -> Failure {
     }
 }
 
-/// A file that is written piece by piece: beside its place, and put there when it is whole ([`PendingFile::keep`]).
+/// A file that is written piece by piece: beside its place, and put there when it is whole ([`PendingFile::keep`]). A
+/// table in CSV becomes arrays if the name of the file asks for them ([`Form`]).
 pub struct PendingFile {
     place: Place,
+    /// Form of the arrays, and the table until it is whole.
+    table: Option<(Form, Vec<u8>)>,
     target: PathBuf,
     /// Whether it may be written.
     guard: Permit,
@@ -135,7 +139,8 @@ impl PendingFile {
             Destination::File(target) => target,
             Destination::Device => {
                 let file = files::open_device(path).map_err(|why| refused_output(path, &why))?;
-                return Ok(Self { place: Place::Device(file), target: path.to_owned(), guard });
+                let (place, target) = (Place::Device(file), path.to_owned());
+                return Ok(Self { place, table: table(path), target, guard });
             }
         };
         let folder = match target.parent() {
@@ -147,7 +152,8 @@ impl PendingFile {
         })?;
         let (file, passing) = Guard::file(|| temporary_beside(&target, folder), |file| file.path().to_owned())
             .map_err(|error| unwritten(path, &plain(&error)))?;
-        Ok(Self { place: Place::Beside { file, _guard: passing, _claimed: claimed }, target, guard })
+        let place = Place::Beside { file, _guard: passing, _claimed: claimed };
+        Ok(Self { place, table: table(path), target, guard })
     }
 
     /// A file that needs only to be kept.
@@ -163,8 +169,12 @@ impl PendingFile {
         self.put()
     }
 
-    fn put(self) -> Result<(), Failure> {
-        let Self { place, target, guard } = self;
+    fn put(mut self) -> Result<(), Failure> {
+        if let Some((form, csv)) = self.table.take() {
+            let arrays = form.of_csv(&csv).map_err(|why| unwritten(&self.target, &why))?;
+            self.write_all(&arrays).map_err(|error| unwritten(&self.target, &error))?;
+        }
+        let Self { place, target, guard, .. } = self;
         match place {
             Place::Device(_) => Ok(()),
             Place::Beside { file, _guard, _claimed } => {
@@ -187,6 +197,9 @@ impl PendingFile {
 
 impl Write for PendingFile {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        if let Some((_, csv)) = &mut self.table {
+            return csv.write(bytes);
+        }
         match &mut self.place {
             // The file below: the name that it has meanwhile is of no use in an error.
             Place::Beside { file, .. } => file.as_file_mut().write(bytes),
@@ -200,6 +213,11 @@ impl Write for PendingFile {
             Place::Device(file) => file.flush(),
         }
     }
+}
+
+/// The beginning of a table for a file of arrays.
+fn table(path: &Path) -> Option<(Form, Vec<u8>)> {
+    Form::of(path).map(|form| (form, Vec::new()))
 }
 
 /// What the system says, without the name of a temporary file, which is of no use to a reader.

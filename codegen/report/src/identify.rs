@@ -59,6 +59,6 @@ impl MeasuredKeys {
     }
 }
 
-fn refused(findings: Vec<Diagnostic>) -> Failure {
+pub(crate) fn refused(findings: Vec<Diagnostic>) -> Failure {
     Failure::from(Refusal { source: None, findings })
 }

@@ -12,6 +12,7 @@
 //! Commands that draw are implemented here, each with its options, tables and texts: [`sim`], [`replay`], [`robust`], [`tune`],
 //! [`identify`], [`reproduce`], [`pages`].
 
+pub mod arrays;
 pub mod budget;
 pub mod chart;
 pub mod drawing;

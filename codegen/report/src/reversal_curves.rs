@@ -1,11 +1,13 @@
 //! Writes and plots records of reversal curves.
 
+use std::fs;
 use std::path::{Path, PathBuf};
 
 use host_sim::forc::ReversalRecord;
 use serde::Serialize;
+use specgen_language::arrays::Form;
 use specgen_language::outcome::{Failure, Outcome};
-use specgen_language::output::write_file;
+use specgen_language::output::{unwritten, write_file};
 
 use crate::chart::{Axis, Chart, LINE};
 use crate::drawing::Plot;
@@ -63,6 +65,17 @@ impl Curves {
 
     fn write(texts: &[String], heads: usize, output: &Path) -> Result<Self, Failure> {
         let paths = [output.to_owned()].into_iter().chain(FURTHER.map(|suffix| beside(output, suffix)));
+        // The user did not name the further ones.
+        for (text, path) in texts.iter().zip(paths.clone()).skip(1) {
+            let head = |text: &str| text.lines().take(heads).map(str::to_owned).collect::<Vec<_>>();
+            let is_own = || fs::read_to_string(&path).is_ok_and(|old| head(&old) == head(text));
+            // Arrays are not compared.
+            let is_other = path.exists() && Form::of(&path).is_none() && !is_own();
+            if is_other {
+                let why = "another file has that name; move it, or name another output";
+                return Err(unwritten(&path, &why));
+            }
+        }
         let mut written = Vec::new();
         for (text, path) in texts.iter().zip(paths) {
             write_file(&path, text.as_bytes())?;

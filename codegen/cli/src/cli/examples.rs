@@ -270,6 +270,13 @@ pub const EXPORT_PYTHON: &str = "\
 Examples:
   specgen export python platform.toml -o python   # controller.py and its library";
 
+pub const EXPORT_TABLE: &str = "\
+Examples:
+  specgen export table record.csv -o record.mat
+  specgen export table record.csv -o record.npz
+
+Every command that writes a table writes these forms, by the suffix.";
+
 pub const EXPORT_FMU: &str = "\
 Examples:
   specgen export fmu platform.toml -o fmu   # for Simulink, Dymola, OMSimulator

@@ -116,6 +116,10 @@ struct ResponseArguments {
     /// Samples per segment; a power of two near an eighth of the record if not given.
     #[arg(long, value_name = "N")]
     segment: Option<usize>,
+    /// Write the response to this file, a table (see `specgen export table`): frequency_Hz, real_um_per_V,
+    /// imaginary_um_per_V, coherence.
+    #[arg(short, long, value_name = "FILE")]
+    output: Option<OutputFile>,
     #[command(flatten)]
     bench: BenchArguments,
 }
@@ -293,8 +297,8 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
         Some(Kind::Linear(LinearArguments { records, frequency, reference, spec, bench })) => {
             linear::run(records, frequency, *reference, spec.as_deref(), &bench.bench()?, ui)
         }
-        Some(Kind::Response(ResponseArguments { record, segment, bench })) => {
-            estimates::response(record, *segment, &bench.bench()?, ui)
+        Some(Kind::Response(ResponseArguments { record, segment, output, bench })) => {
+            estimates::response(record, *segment, output.as_deref(), &bench.bench()?, ui)
         }
         Some(Kind::Gains(GainsArguments { recording, spec, output })) => {
             gains::run(recording, spec, output.as_deref(), ui)
@@ -345,7 +349,10 @@ fn record(arguments: &EverettArguments, ui: &mut Ui) -> Result<(), Failure> {
     }
     // A folder in its place is for a recorded run only.
     output.as_deref().map_or(Ok(()), check_place)?;
-    let Some(drive) = drive else { return usage("expected the voltage range of the table, --drive MIN:MAX in V") };
+    let Some(drive) = drive else {
+        let given: Vec<String> = std::env::args().skip_while(|word| word != "identify").skip(1).collect();
+        return Err(everett::missing_range(records, &bench.bench()?, &given, ui));
+    };
     let dead_time = dead_time.map_or(DeadTime::Estimate, |ms| DeadTime::Fixed(ms * 1e-3));
     let options = everett::Options { drive: *drive, grid: *grid, dead_time, model: *model };
     everett::run(records, &options, validate.as_deref(), output.as_deref(), &bench.bench()?, ui)

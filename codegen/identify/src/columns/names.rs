@@ -140,13 +140,13 @@ impl Quantity {
 }
 
 fn per(units: &[Unit], unit: &str) -> Option<f64> {
-    units.iter().find(|(name, _)| name.eq_ignore_ascii_case(unit)).map(|(_, per)| *per)
+    units.iter().find(|(name, _)| name.to_ascii_lowercase() == unit).map(|(_, per)| *per)
 }
 
 /// Number of the header's units in one of `denominator`, such as 1000 for `CH2 (mV)` and `V`.
 ///
 /// # Errors
-/// The header's unit, if it is of another kind. A unit that is not known counts as equal.
+/// The header's unit, if it is of another kind, or not known and another text.
 pub(crate) fn per_denominator(header: &str, denominator: &str) -> Result<f64, String> {
     let (Some(own), denominator) = (parts(header).1, unit(denominator)) else { return Ok(1.0) };
     let kinds = [TIME, VOLTAGE, LENGTH, FORCE];
@@ -154,6 +154,9 @@ pub(crate) fn per_denominator(header: &str, denominator: &str) -> Result<f64, St
     match (kind(&own), kind(&denominator)) {
         (Some((a, own)), Some((b, other))) if a == b => Ok(own / other),
         (Some(_), Some(_)) => Err(own),
+        (None, _) if own != denominator && own.chars().count() <= UNKNOWN && unit_in_brackets(header).is_some() => {
+            Err(own)
+        }
         _ => Ok(1.0),
     }
 }
@@ -199,10 +202,17 @@ fn parts(header: &str) -> (String, Option<String>) {
     }
 }
 
-fn unit(text: &str) -> String {
+/// Units that are not those with a small letter.
+const MEGA: [&str; 4] = ["MN", "Mm", "Ms", "Mrad"];
+/// Most letters of a unit that is not known; longer texts in brackets are remarks.
+const UNKNOWN: usize = 4;
+
+fn unit(given: &str) -> String {
     // `Â` is the first half of a UTF-8 µ that was read as Latin-1.
-    let text = text.trim().replace('Â', "").to_lowercase().replace(['µ', 'μ'], "u");
+    let text = given.trim().replace('Â', "").to_lowercase().replace(['µ', 'μ'], "u");
     match text.as_str() {
+        // Mega, not milli.
+        "mn" | "mm" | "ms" | "mrad" if MEGA.contains(&given.trim()) => given.trim().to_owned(),
         "volt" | "volts" => "v".to_owned(),
         "sec" | "seconds" => "s".to_owned(),
         "micron" | "microns" => "um".to_owned(),
@@ -234,12 +244,17 @@ mod tests {
             ("Position nm", "displacement_um", Some((Fit::OtherName, 1e3))),
             ("monitor_V", "drive_V", None),
             ("force_kN", "force_N", Some((Fit::OtherUnit, 1e-3))),
+            ("force_MN", "force_N", None),
+            ("FORCE_mN", "force_N", Some((Fit::OtherUnit, 1e3))),
         ] {
             assert_eq!(quantity(name).unwrap().fits(header), expected, "{header}");
         }
         assert_eq!(per_denominator("CH2 (mV)", "V"), Ok(1e3));
         assert_eq!(per_denominator("CH2", "V"), Ok(1.0));
         assert_eq!(per_denominator("CH2 [um]", "V"), Err("um".to_owned()));
+        assert_eq!(per_denominator("CH2 (bar)", "V"), Err("bar".to_owned()));
+        assert_eq!(per_denominator("CH2 (bar)", "bar"), Ok(1.0));
+        assert_eq!(per_denominator("CH2 (Filtered)", "V"), Ok(1.0));
         for (header, at, expected) in [
             ("x (um)", 0, Some((Fit::OtherUnit, 1.0))),
             ("X_MM", 0, Some((Fit::OtherUnit, 1e-3))),

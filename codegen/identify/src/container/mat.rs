@@ -10,6 +10,7 @@ use flate2::read::ZlibDecoder;
 
 use super::bytes::{Bytes, DAMAGED};
 use super::{Array, Contents, LARGEST};
+use specgen_language::arrays::COMMENT;
 
 /// Name of a time in s.
 const TIME: &str = "time_s";
@@ -21,6 +22,8 @@ const ARRAY: u32 = 14;
 const COMPRESSED: u32 = 15;
 /// Classes of arrays of numbers.
 const NUMBERS: RangeInclusive<u8> = 6..=15;
+/// Flag of an array with imaginary parts.
+const COMPLEX: u8 = 8;
 const STRUCT: u8 = 2;
 const TEXT: u8 = 4;
 /// Objects of classes: texts in double quotes, time series, tables.
@@ -30,7 +33,8 @@ const DEEPEST: usize = 6;
 
 /// A variable, or a field of a struct.
 enum Value {
-    Numbers(Vec<usize>, Vec<f64>),
+    /// Size and values; whether there are imaginary parts, too.
+    Numbers(Vec<usize>, Vec<f64>, bool),
     Text(String),
     /// Names of the fields, and the values of the fields of each struct in turn.
     Structs(Vec<String>, Vec<Self>),
@@ -87,10 +91,11 @@ fn text(from: &mut Bytes) -> Result<String, String> {
 /// Name and value of an array with these parts.
 fn variable(mut parts: Bytes, depth: usize) -> Result<(String, Value), String> {
     if parts.rest.is_empty() {
-        return Ok((String::new(), Value::Numbers(Vec::new(), Vec::new())));
+        return Ok((String::new(), Value::Numbers(Vec::new(), Vec::new(), false)));
     }
     let (_, flags) = element(&mut parts)?;
     let class = *flags.get(if parts.is_big_endian { 3 } else { 0 }).ok_or(DAMAGED)?;
+    let is_complex = flags.get(if parts.is_big_endian { 2 } else { 1 }).is_some_and(|flags| flags & COMPLEX > 0);
     if class == OPAQUE {
         let [name, _system, class] = [text(&mut parts)?, text(&mut parts)?, text(&mut parts)?];
         return Ok((name, Value::Other(format!("an object of class {class}"))));
@@ -106,7 +111,7 @@ fn variable(mut parts: Bytes, depth: usize) -> Result<(String, Value), String> {
             if count != values.len() {
                 return Err(DAMAGED.to_owned());
             }
-            Value::Numbers(size, values)
+            Value::Numbers(size, values, is_complex)
         }
         TEXT => Value::Text(text(&mut parts)?),
         STRUCT if depth < DEEPEST => {
@@ -137,10 +142,14 @@ fn add(group: &str, name: &str, value: Value, contents: &mut Contents) {
     match value {
         // Written after the variables, with the content of their objects.
         Value::Numbers(..) if name.is_empty() => {}
-        Value::Numbers(size, values) => {
+        Value::Numbers(size, values, is_complex) => {
+            if is_complex {
+                contents.others.push((name.to_owned(), "its imaginary part".to_owned()));
+            }
             contents.arrays.push(Array { group: group.to_owned(), name: name.to_owned(), size, values });
         }
         Value::Text(_) if !group.is_empty() => {}
+        Value::Text(text) if name == COMMENT => contents.comment = Some(text),
         Value::Text(_) => contents.others.push((name.to_owned(), "a text".to_owned())),
         Value::Other(what) => contents.others.push((name.to_owned(), what)),
         Value::Structs(fields, values) => add_structs(group, name, &fields, values, contents),

@@ -1,7 +1,11 @@
 //! Arrays of NumPy (NEP 1): a header that describes them, then their values.
 
 use super::bytes::{Bytes, DAMAGED};
-use super::{Array, Contents};
+use super::{Array, Contents, LARGEST};
+use flate2::read::DeflateDecoder;
+use rawzip::{CompressionMethod, ZipArchive};
+use specgen_language::arrays::COMMENT;
+use std::io::Read;
 
 /// Bytes of magic and version.
 const VERSION: usize = 8;
@@ -57,7 +61,55 @@ pub(super) fn contents(file: &[u8]) -> Result<Contents, String> {
                 }
                 contents.arrays.push(Array { group: String::new(), name, size, values });
             }
-            _ => contents.others.push((name, "no array of numbers".to_owned())),
+            kind => {
+                if kind == 'U' && shape.is_empty() {
+                    let letters = Bytes { rest: own, is_big_endian }.numbers(('u', 4));
+                    contents.comment = Some(letters.into_iter().filter_map(|c| char::from_u32(c as u32)).collect());
+                }
+                contents.others.push((name, "no array of numbers".to_owned()));
+            }
+        }
+    }
+    Ok(contents)
+}
+
+/// Whether a file that begins so is an archive of arrays: by the name of its first file.
+pub(super) fn is_archive(first: &[u8]) -> bool {
+    let length = first.get(26..28).map_or(0, |bytes| usize::from(bytes[0]) | usize::from(bytes[1]) << 8);
+    let name = first.get(30..).map(|rest| &rest[..length.min(rest.len())]);
+    first.starts_with(b"PK\x03\x04") && name.is_some_and(|name| name.ends_with(b".npy"))
+}
+
+/// The arrays of an archive, which are called as their files.
+pub(super) fn of_archive(file: &[u8]) -> Result<Contents, String> {
+    let archive = ZipArchive::from_slice(file).map_err(|_| DAMAGED)?;
+    let mut contents = Contents::default();
+    let mut left = LARGEST;
+    for entry in archive.entries() {
+        let entry = entry.map_err(|_| DAMAGED)?;
+        let path = String::from_utf8_lossy(entry.file_path().as_ref()).into_owned();
+        let Some(name) = path.strip_suffix(".npy") else { continue };
+        let method = entry.compression_method();
+        let data = archive.get_entry(entry.wayfinder()).map_err(|_| DAMAGED)?.data();
+        let mut unpacked = Vec::new();
+        let read = match method {
+            CompressionMethod::STORE => data.take(left + 1).read_to_end(&mut unpacked),
+            CompressionMethod::DEFLATE => DeflateDecoder::new(data).take(left + 1).read_to_end(&mut unpacked),
+            _ => return Err("it is packed in an unusual way: write it with numpy.savez".to_owned()),
+        };
+        read.map_err(|_| DAMAGED)?;
+        let size = unpacked.len() as u64;
+        left = left.checked_sub(size).ok_or(format!("unpacked, it is larger than {} MiB", LARGEST >> 20))?;
+        match self::contents(&unpacked) {
+            Ok(found) => {
+                contents.comment = contents.comment.or(found.comment.filter(|_| name == COMMENT));
+                let is_comment = name == COMMENT && contents.comment.is_some();
+                let called = |own: String| if own.is_empty() { name.to_owned() } else { own };
+                contents.arrays.extend(found.arrays.into_iter().map(|one| Array { name: called(one.name), ..one }));
+                let others = found.others.into_iter().filter(|_| !is_comment);
+                contents.others.extend(others.map(|(own, what)| (called(own), what)));
+            }
+            Err(why) => contents.others.push((name.to_owned(), why)),
         }
     }
     Ok(contents)
@@ -71,26 +123,26 @@ fn value<'a>(header: &'a str, key: &str) -> Result<&'a str, String> {
 
 /// The fields of a description such as `'<f8'` or `[('time_s', '<f8'), ('drive_V', '<f4')]`.
 fn fields(text: &str) -> Result<Vec<Field>, String> {
-    if let Some(list) = text.strip_prefix('[') {
-        let list = list.split_once(']').ok_or(DAMAGED)?.0;
-        return list
-            .split('(')
-            .skip(1)
-            .map(|field| {
-                let mut words = field.split('\'').skip(1).step_by(2);
-                let (Some(name), Some(form), None) = (words.next(), words.next(), words.next()) else {
-                    return Err("it has fields of more than one number".to_owned());
-                };
-                // Behind the format there may be a shape.
-                if field.rsplit('\'').next().is_some_and(|rest| rest.contains(|c: char| c.is_ascii_digit())) {
-                    return Err("it has fields of more than one number".to_owned());
-                }
-                of_form(name, form)
-            })
-            .collect();
+    let several = || "it has fields of more than one number".to_owned();
+    if let Some(mut rest) = text.strip_prefix('[') {
+        let mut fields = Vec::new();
+        while let Some(field) = rest.trim_start_matches([' ', ',']).strip_prefix('(') {
+            // Behind the format there may be a shape.
+            let (name, format) = quoted(field).ok_or_else(several)?;
+            let (form, end) = quoted(format.trim_start_matches([' ', ','])).ok_or_else(several)?;
+            rest = end.strip_prefix(')').ok_or_else(several)?;
+            fields.push(of_form(name, form)?);
+        }
+        return if fields.is_empty() { Err(DAMAGED.to_owned()) } else { Ok(fields) };
     }
     let form = text.strip_prefix('\'').and_then(|rest| rest.split_once('\'')).ok_or(DAMAGED)?.0;
     Ok(vec![of_form("", form)?])
+}
+
+/// The text in quotation marks at the beginning of `text`, and the rest.
+fn quoted(text: &str) -> Option<(&str, &str)> {
+    let mark = text.chars().next().filter(|mark| matches!(mark, '\'' | '"'))?;
+    text[1..].split_once(mark)
 }
 
 /// A field with a format such as `<f8`.
@@ -123,12 +175,12 @@ mod tests {
 
     #[test]
     fn fields_and_columns_of_both_orders_are_read() {
-        let descr = "[('time_s', '<f8'), ('n', '|b1'), ('drive_V', '>i2')]";
+        let descr = "[('time_s', '<f8'), ('n', '|b1'), ('drive [V] (a)', '>i2')]";
         let header = format!("{{'descr': {descr}, 'fortran_order': False, 'shape': (2,), }}\n");
         let row = |t: f64, u: i16| [&t.to_le_bytes()[..], &[1], &u.to_be_bytes()].concat();
         let found = contents(&file(&header, &[row(0.5, -3), row(1.5, 4)].concat())).unwrap();
         let columns: Vec<_> = found.arrays.iter().map(|array| (array.name.as_str(), array.values.clone())).collect();
-        assert_eq!(columns, [("time_s", vec![0.5, 1.5]), ("drive_V", vec![-3.0, 4.0])]);
+        assert_eq!(columns, [("time_s", vec![0.5, 1.5]), ("drive [V] (a)", vec![-3.0, 4.0])]);
         assert_eq!(found.others[0].0, "n");
         for (order, size) in [("True", [3, 2]), ("False", [2, 3])] {
             let header = format!("{{'descr': '<f4', 'fortran_order': {order}, 'shape': (3, 2), }}\n");

@@ -100,6 +100,7 @@ fn read_objects(mut from: Bytes, objects: &mut Vec<Object>, listed: &mut Vec<usi
 pub(super) fn contents(file: &[u8]) -> Result<Contents, String> {
     let (mut objects, mut listed) = (Vec::<Object>::new(), Vec::new());
     let mut file = Bytes { rest: file, is_big_endian: false };
+    let mut is_interrupted = false;
     while !file.rest.is_empty() {
         if file.take(4)? != b"TDSm" {
             return Err(DAMAGED.to_owned());
@@ -109,6 +110,7 @@ pub(super) fn contents(file: &[u8]) -> Result<Contents, String> {
         file.is_big_endian = has & BIG_ENDIAN > 0;
         let (_version, length, before_values) = (file.word()?, file.count()?, file.count()?);
         // An interrupted writer leaves all bits set.
+        is_interrupted |= length == usize::MAX;
         let segment = file.take(if length == usize::MAX { file.rest.len() } else { length })?;
         let (rest, values) = segment.split_at_checked(before_values).ok_or(DAMAGED)?;
         if has & OBJECTS_ALL_NEW > 0 {
@@ -142,6 +144,9 @@ pub(super) fn contents(file: &[u8]) -> Result<Contents, String> {
         }
     }
     let mut contents = Contents::default();
+    if is_interrupted {
+        contents.others.push(("end of the file".to_owned(), "its writer was interrupted there".to_owned()));
+    }
     for Object { path, kind, values, .. } in objects {
         // The path of a channel is `/'group'/'channel'`, with quotes in names doubled.
         let Some((group, name)) = path.rsplit_once("'/'") else { continue };

@@ -28,7 +28,7 @@ pub(super) fn parse(text: &str, quantity: &Quantity, per: Option<f64>) -> Result
             let Some((factor, rest)) = number(scale) else { return expected("a factor behind `*`") };
             (column, factor, rest)
         }
-        None => match text.rfind(['+', '-']).filter(|at| number(&text[*at..]).is_some()) {
+        None => match offset(text, quantity) {
             Some(at) => (&text[..at], 1.0, &text[at..]),
             None => return Ok(None),
         },
@@ -55,6 +55,14 @@ pub(super) fn parse(text: &str, quantity: &Quantity, per: Option<f64>) -> Result
     }))
 }
 
+/// Place of the sign of an offset: the first with a number and a unit behind it, or else the last with a number.
+fn offset(text: &str, quantity: &Quantity) -> Option<usize> {
+    let rest = |at: &usize| number(&text[*at..]).map(|(_, rest)| rest.trim());
+    let is_whole = |rest: &str| rest.is_empty() || quantity.per(rest).is_some();
+    let mut signs = text.match_indices(['+', '-']).map(|(at, _)| at);
+    signs.find(|at| rest(at).is_some_and(is_whole)).or_else(|| text.rfind(['+', '-']).filter(|at| rest(at).is_some()))
+}
+
 /// The number at the beginning of a text, and the rest. Blanks may follow its sign.
 fn number(text: &str) -> Option<(f64, &str)> {
     let text = text.trim_start();
@@ -79,6 +87,8 @@ mod tests {
             ("CH2 * 5um/V + 0.3 um", None, "CH2", [5.0, 0.3], Some("V")),
             ("2*-5e-3 mm/V-300 nm", None, "2", [-5.0, -0.3], Some("V")),
             ("CH2+300 nm", Some(1.0), "CH2", [1.0, 0.3], None),
+            ("CH2-5e-3 mm", Some(1.0), "CH2", [1.0, -5.0], None),
+            ("CH-2-5e-3 mm", Some(1.0), "CH-2", [1.0, -5.0], None),
             ("CH2*2+1", Some(1e3), "CH2", [2e-3, 1e-3], None),
             ("a*b*2", Some(1.0), "a*b", [2.0, 0.0], None),
         ] {

@@ -11,9 +11,9 @@ use crate::identification as figure;
 use specgen_identify::gauge::{GaugeCalibration, calibrate, spec_line};
 use specgen_identify::response::{FrequencyResponse, respond};
 use specgen_identify::stiffness::{AxialStiffness, measure};
-use specgen_identify::{Estimate, Input, Parameter};
+use specgen_identify::{Estimate, Input, Parameter, marked_as_simulated};
 use specgen_language::outcome::{Failure, Outcome};
-use specgen_language::output::write_file;
+use specgen_language::output::{check_place, write_file};
 use specgen_language::ui::Ui;
 
 /// Shows what was estimated from a record, which measures `keys` of a spec, and draws its `figure`.
@@ -67,11 +67,35 @@ impl Outcome for IdentificationResult<Estimate<AxialStiffness>> {
 ///
 /// # Errors
 /// A file cannot be read or written, or its data are unsuitable.
-pub fn response(record: &Path, segment: Option<usize>, bench: &Bench, ui: &mut Ui) -> Result<(), Failure> {
+pub fn response(
+    record: &Path,
+    segment: Option<usize>,
+    output: Option<&Path>,
+    bench: &Bench,
+    ui: &mut Ui,
+) -> Result<(), Failure> {
+    output.map_or(Ok(()), check_place)?;
     let shown = record.display().to_string();
     let report = respond(Input::File(record, &bench.reading), &shown, segment).map_err(refused)?;
     let keys = ["actuator.resonance", "actuator.damping_ratio", "amplifier.lag"];
+    if let Some(path) = output {
+        let text = bins(&report.value);
+        let text = if report.simulated { marked_as_simulated(&text) } else { text };
+        write_file(path, text.as_bytes())?;
+        ui.progress(wrote(path).trim_end());
+    }
     show(report, &keys, ("Frequency response", figure::response), bench, ui)
+}
+
+/// The response as CSV: a row for each bin that is used.
+fn bins(response: &FrequencyResponse) -> String {
+    let mut text = "frequency_Hz,real_um_per_V,imaginary_um_per_V,coherence\n".to_owned();
+    for bin in &response.bins {
+        let [real, imaginary] = bin.h.map(|part| part * 1e6);
+        // Writing to a String cannot fail.
+        let _ = writeln!(text, "{:?},{real:?},{imaginary:?},{:?}", bin.frequency, bin.coherence);
+    }
+    text
 }
 
 impl Outcome for IdentificationResult<Estimate<FrequencyResponse>> {

@@ -16,6 +16,7 @@ use crate::identification as figure;
 use specgen_language::model::LegModelKind;
 use specgen_language::outcome::{Failure, Outcome};
 use specgen_language::output::write_file;
+use specgen_language::shell;
 use specgen_language::table::{right, row};
 use specgen_language::ui::Ui;
 
@@ -30,6 +31,38 @@ pub struct Options {
     pub dead_time: DeadTime,
     /// Family of the leg model.
     pub model: LegModelKind,
+}
+
+/// What is in the records, and the command line that identifies them over the range of their drive; or why they are refused.
+/// `given` are the words of the command that lacks the range.
+pub fn missing_range(paths: &[impl AsRef<Path>], bench: &Bench, given: &[String], ui: &mut Ui) -> Failure {
+    let mut text = String::new();
+    let mut whole = [f64::INFINITY, f64::NEG_INFINITY];
+    for path in paths {
+        let shown = path.as_ref().display().to_string();
+        let record = match identify::read_record(path.as_ref(), &shown, &bench.reading) {
+            Ok(record) => record,
+            Err(findings) => return refused(findings),
+        };
+        ui.findings(None, &record.warnings);
+        let (low, high) = identify::extent(&record.drive);
+        whole = [if low < whole[0] { low } else { whole[0] }, if high > whole[1] { high } else { whole[1] }];
+        let (least, most) = identify::extent(&record.displacement);
+        let seconds = record.time[record.time.len() - 1] - record.time[0];
+        // Writing to a String cannot fail.
+        let _ = write!(
+            text,
+            "{shown}: {} samples in {seconds:.3} s, drive {low} V to {high} V, displacement {:.3} µm to {:.3} µm; ",
+            record.time.len(),
+            least * 1e6,
+            most * 1e6
+        );
+    }
+    let mut line = shell::line("specgen identify").word(&format!("--drive={}:{}", whole[0], whole[1]));
+    for word in given {
+        line = line.word(word);
+    }
+    Failure::Usage(format!("{text}the voltage range of the table is missing, such as that of the drive: `{line}`"))
 }
 
 /// Reads the records of a leg, identifies, writes the requested files and shows the result.

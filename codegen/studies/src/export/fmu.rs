@@ -6,15 +6,14 @@ mod plant;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::fs;
-use std::io::{self, Cursor, Write};
 use std::path::Path;
 
 use host_sim::word::{Scalar, WordKind};
-use rawzip::ZipArchiveWriter;
 use serde::Serialize;
 use specgen_compiler::compile::Compilation;
 use specgen_compiler::spec_file;
 
+use specgen_language::arrays::zipped;
 use specgen_language::outcome::{Failure, Outcome, environment};
 use specgen_language::output::{claim, write_folder, write_scratch};
 use specgen_language::ui::Ui;
@@ -56,21 +55,6 @@ struct PackedUnit {
     name: String,
     bytes: Vec<u8>,
     variables: usize,
-}
-
-/// Sorted by name, without timestamps: the same files give the same bytes.
-fn zipped(files: &BTreeMap<String, Vec<u8>>) -> io::Result<Vec<u8>> {
-    let mut out = Cursor::new(Vec::new());
-    let mut archive = ZipArchiveWriter::new(&mut out);
-    for (name, bytes) in files {
-        let (mut entry, config) = archive.new_file(name).start().map_err(io::Error::other)?;
-        let mut writer = config.wrap(&mut entry);
-        writer.write_all(bytes)?;
-        let (_, written) = writer.finish().map_err(io::Error::other)?;
-        entry.finish(written).map_err(io::Error::other)?;
-    }
-    archive.finish().map_err(io::Error::other)?;
-    Ok(out.into_inner())
 }
 
 /// Result of an export.
@@ -184,7 +168,7 @@ impl<'a> Unit<'a> {
         let place = format!("binaries/{PLATFORM}/{}{}", self.identifier, std::env::consts::DLL_SUFFIX);
         files.insert(place, fs::read(library).map_err(environment)?);
         files.extend(sources.into_iter().map(|(name, text)| (format!("sources/{name}"), text.into_bytes())));
-        let bytes = zipped(&files).map_err(environment)?;
+        let bytes = zipped(files.iter().map(|(name, file)| (name.as_str(), file.as_slice()))).map_err(environment)?;
         Ok(PackedUnit { name: format!("{}.fmu", self.identifier), bytes, variables: self.variables.len() })
     }
 

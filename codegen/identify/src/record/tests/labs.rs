@@ -3,6 +3,7 @@
 use super::files::{assert_same, comma, file, read, read_as, rows};
 use super::mat_file::{self as mat, column, doubles, int32, object, structs, subsystem, text};
 use super::*;
+use specgen_language::arrays::Form;
 use std::io::Write as _;
 
 fn values(k: usize) -> Vec<f64> {
@@ -141,7 +142,15 @@ fn stretches_between_gaps_and_joined_runs_are_records() {
         file("time_s,drive_V,displacement_um", |[t, u, y]| format!("{},{u},{y}", if t < 0.1 { t } else { t + 0.05 }));
     let record = read(gap.as_bytes(), &[], None).unwrap();
     assert!(record.time.len() == 140 && (record.time[0] - 0.15).abs() < 1e-9, "{}", record.time[0]);
-    assert!(note(&record).contains("0 s to 0.099 s"), "{}", note(&record));
+    assert!(note(&record).contains("not read: 1 (0 s to 0.099 s)"), "{}", note(&record));
+    assert!(record.warnings[0].help.contains("`--series 1`"), "{:?}", record.warnings);
+    let plain = |series: &str| Reading::default().of_series(Some(series.to_owned()));
+    let first = read_as(gap.as_bytes(), &plain("1")).unwrap();
+    assert_eq!((first.time.len(), first.time[99], first.warnings.len()), (100, rows()[99][0], 0));
+    let found = read_as(gap.as_bytes(), &plain("3")).unwrap_err();
+    assert!(found[0].message.contains("stretch 3") && found[0].message.contains("2 (0.15"), "{found:?}");
+    let after = read_as(format!("R;C\n10;2\n\n{gap}").as_bytes(), &plain("2.1")).unwrap();
+    assert_eq!(after.time.len(), 100);
     let whole = file("time_s,drive_V,displacement_um", |[t, u, y]| format!("{t},{u},{y}"));
     let joined = whole.clone() + &whole.lines().skip(1).take(150).collect::<Vec<_>>().join("\n");
     assert!(note(&assert_same("joined", read(joined.as_bytes(), &[], None))).contains("starts again"));
@@ -158,4 +167,35 @@ fn curves_without_their_ways_back_are_refused_for_that() {
     let text = format!("MicroMag\nNForc = 12\n\n   Field       Moment\n   (Oe)         (emu)\n\n{}", curves.join("\n"));
     let found = read(text.as_bytes(), &[], None).unwrap_err();
     assert!(found[0].code == "E0511" && found[0].message.contains("12 curves"), "{found:?}");
+}
+
+/// What is written as arrays is read back to the bit, with its mark.
+#[test]
+fn written_arrays_are_the_same_record() {
+    let third = |value: f64| value / 3.0;
+    let plain = file("time_s,drive_V,displacement_um", |row| {
+        let [t, u, y] = row.map(third);
+        format!("{t:?},{u:?},{y:?}")
+    });
+    for text in [plain.clone(), crate::marked_as_simulated(&plain)] {
+        let wanted = read(text.as_bytes(), &[], None).unwrap();
+        for form in [Form::Npz, Form::Mat] {
+            let record = read(&form.of_csv(text.as_bytes()).unwrap(), &[], None).unwrap();
+            let bits = |record: &Record| {
+                let all = [&record.time, &record.drive, &record.displacement].map(|values| values.iter());
+                all.into_iter().flatten().map(|value| value.to_bits()).collect::<Vec<_>>()
+            };
+            assert_eq!(bits(&record), bits(&wanted), "{form:?}");
+            assert_eq!((record.simulated, record.warnings.len()), (wanted.simulated, 0), "{form:?}");
+        }
+    }
+    // Texts and other sizes are left out; what is packed is unpacked; a damaged archive is named.
+    let named = file("time_s,mode,drive_V,displacement_um", |[t, u, y]| format!("{t:?},on,{u:?},{y:?}"));
+    for form in [Form::Npz, Form::Mat] {
+        let written = form.of_csv(named.as_bytes()).unwrap();
+        let record = assert_same("texts", read(&written, &[], None));
+        assert!(note(&record).contains("left out: `mode`"), "{form:?}: {}", note(&record));
+        let cut = read(&written[..written.len() / 2], &[], None).unwrap_err();
+        assert!(cut[0].code == "E0503" && cut[0].message.contains("cut off"), "{form:?}: {cut:?}");
+    }
 }
