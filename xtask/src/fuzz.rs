@@ -14,7 +14,7 @@ use crate::run::{Outcome, Report, cargo, expect_success};
 /// Its own workspace.
 pub const MANIFEST: &str = "tests/fuzz/Cargo.toml";
 /// Names of the targets, as in `TARGETS` of `tests/fuzz/targets`.
-const TARGETS: [&str; 5] = ["spec", "csv", "record", "link", "operator"];
+const TARGETS: [&str; 9] = ["spec", "csv", "mat", "hdf5", "tdms", "packed", "record", "link", "operator"];
 /// The corpus, with a folder for each target.
 const CORPUS: &str = "tests/fuzz/corpus";
 /// Inputs of earlier runs, a folder for each target, and the build.

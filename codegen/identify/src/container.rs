@@ -16,7 +16,8 @@ use std::io::{self, Read};
 
 use super::columns::names::quantity;
 use super::tables::{Extent, listed};
-use specgen_language::files::MAX_BYTES as LARGEST;
+use bytes::MOST_ARRAYS;
+pub(crate) use bytes::{FARTHEST, Refusal, unpack};
 
 /// Names and values.
 type Columns = Vec<(String, Vec<f64>)>;
@@ -40,6 +41,8 @@ struct Contents {
     others: Vec<(String, String)>,
     /// Comments of a table that specgen wrote.
     comment: Option<String>,
+    /// Whether it has more than is read.
+    is_full: bool,
 }
 
 /// Tables of a file, and what is in none of them.
@@ -109,24 +112,38 @@ impl Kind {
         }
     }
 
-    /// The tables of `file`.
+    /// The tables of `file`, whose numbers, at 8 bytes each, and unpacked parts take at most `limit` bytes.
     ///
     /// # Errors
     /// Reason why it has none, as a text that follows the name of the file.
-    pub(crate) fn tables(self, file: Vec<u8>) -> Result<Tables, String> {
+    pub(crate) fn tables(self, file: Vec<u8>, limit: u64) -> Result<Tables, Refusal> {
         let contents = match self {
-            Self::Mat => mat::contents(&file),
-            Self::Mat73 | Self::Hdf5 => hdf5::contents(file),
-            Self::Tdms => tdms::contents(&file),
-            Self::Npy => npy::contents(&file),
-            Self::Npz => npy::of_archive(&file),
+            Self::Mat => mat::contents(&file, limit),
+            Self::Mat73 | Self::Hdf5 => hdf5::contents(file, limit),
+            Self::Tdms => tdms::contents(&file, limit),
+            Self::Npy => npy::contents(&file, limit),
+            Self::Npz => npy::of_archive(&file, limit),
         };
-        let found = tables(contents.map_err(|error| format!("cannot be read: {error}"))?);
+        let found = match contents {
+            Ok(contents) if contents.is_full() => {
+                return Err(format!("cannot be read: it has more than {MOST_ARRAYS} arrays or names").into());
+            }
+            Ok(contents) => tables(contents),
+            Err(Refusal::Because(error)) => return Err(format!("cannot be read: {error}").into()),
+            Err(large) => return Err(large),
+        };
         if !found.tables.is_empty() {
             return Ok(found);
         }
         let there = if found.left_out.is_empty() { "nothing".to_owned() } else { listed(&found.left_out) };
-        Err(format!("has no two arrays of numbers of one length for the columns, but {there}"))
+        Err(format!("has no two arrays of numbers of one length for the columns, but {there}").into())
+    }
+}
+
+impl Contents {
+    /// Whether more was found than is read.
+    fn is_full(&self) -> bool {
+        self.is_full || self.arrays.len() + self.others.len() > MOST_ARRAYS
     }
 }
 

@@ -1,7 +1,7 @@
 //! Opens data files: to keep their text, or to read a table of them line by line.
 //!
 //! Text is read in sequence, whatever its size. Text in UTF-16, files packed by gzip and the binary files of
-//! [`container`](super::container) are unpacked in memory, up to [`MAX_FILE_BYTES`].
+//! [`container`](super::container) are unpacked in memory, up to a limit.
 
 use std::io::{self, Cursor, Read, Seek};
 use std::path::Path;
@@ -9,8 +9,9 @@ use std::path::Path;
 use flate2::read::MultiGzDecoder;
 
 use super::columns::{self, Part, foreign, names};
-use super::container::{Kind, Lines, Table};
+use super::container::{FARTHEST, Kind, Lines, Refusal, Table, unpack};
 use super::findings::Findings;
+use super::reading::{MaxSize, Reading, shown_size};
 use super::tables::{self, Choice, Extent};
 use specgen_language::diagnostic::{Diagnostic, codes};
 pub use specgen_language::files::MAX_BYTES as MAX_FILE_BYTES;
@@ -36,11 +37,12 @@ impl<'a> Source<'a> {
     }
 
     /// A table of a file in memory.
-    pub(crate) fn of_bytes(file: Vec<u8>, series: Option<&str>, findings: &mut Findings) -> Option<Source<'static>> {
-        let text = match unpacked(file, findings)? {
+    pub(crate) fn of_bytes(file: Vec<u8>, reading: &Reading, findings: &mut Findings) -> Option<Source<'static>> {
+        let (limit, series) = (reading.max_size(), reading.series());
+        let text = match unpacked(file, limit, findings)? {
             Unpacked::Text(text) => text,
             Unpacked::Tables(kind, file) => {
-                let (lines, choice) = table(kind, file, series, findings)?;
+                let (lines, choice) = table(kind, file, series, limit, findings)?;
                 return Some(Source { choice, ..Source::whole(lines) });
             }
         };
@@ -68,12 +70,22 @@ fn part(text: impl Read, series: Option<&str>, findings: &mut Findings) -> Optio
 }
 
 /// The table of a binary file that is read.
-fn table(kind: Kind, file: Vec<u8>, series: Option<&str>, findings: &mut Findings) -> Option<(Lines, Choice)> {
-    let found = kind.tables(file).map_err(|why| {
-        let message = format!("is {} and {why}", kind.name());
-        findings.add(codes::RECORD_NOT_TEXT, None, message, "save time, drive and displacement as arrays of numbers");
-    });
-    let mut found = found.ok()?;
+fn table(
+    kind: Kind,
+    file: Vec<u8>,
+    series: Option<&str>,
+    limit: MaxSize,
+    findings: &mut Findings,
+) -> Option<(Lines, Choice)> {
+    let mut found = match kind.tables(file, limit.bytes) {
+        Ok(found) => found,
+        Err(Refusal::Large(size)) => return too_large("unpacked, is", size, limit, findings),
+        Err(Refusal::Because(why)) => {
+            let message = format!("is {} and {why}", kind.name());
+            let help = "save time, drive and displacement as arrays of numbers";
+            return findings.refuse(codes::RECORD_NOT_TEXT, None, message, help);
+        }
+    };
     let extents: Vec<Extent> = found.tables.iter().map(Table::extent).collect();
     let chosen = tables::choose(&extents, is_record, &found.left_out, series, findings)?;
     Some((found.tables.swap_remove(chosen.table).lines(found.comment), chosen))
@@ -90,16 +102,20 @@ fn is_packed(first: &[u8]) -> bool {
 }
 
 /// Unpacks gzip, then UTF-16; `None` after the problem was reported.
-fn unpacked(mut file: Vec<u8>, findings: &mut Findings) -> Option<Unpacked> {
+fn unpacked(mut file: Vec<u8>, limit: MaxSize, findings: &mut Findings) -> Option<Unpacked> {
     if file.starts_with(&[0x1f, 0x8b]) {
         let mut content = Vec::new();
-        let packed = MultiGzDecoder::new(&file[..]).take(MAX_FILE_BYTES + 1).read_to_end(&mut content);
-        if let Err(error) = packed {
-            let message = format!("is packed by gzip and cannot be unpacked: {error}");
-            return findings.refuse(codes::RECORD_NOT_TEXT, None, message, "copy the file again, or pack it again");
-        }
-        if content.len() as u64 > MAX_FILE_BYTES {
-            return too_large("unpacked, is", findings);
+        let farthest = limit.bytes.saturating_mul(FARTHEST);
+        let size = match unpack(MultiGzDecoder::new(&file[..]), limit.bytes, farthest, &mut content) {
+            Ok(size) => size,
+            Err(error) => {
+                let message = format!("is packed by gzip and cannot be unpacked: {error}");
+                let help = "copy the file again, or pack it again";
+                return findings.refuse(codes::RECORD_NOT_TEXT, None, message, help);
+            }
+        };
+        if size.is_none_or(|size| size > limit.bytes) {
+            return too_large("unpacked, is", size, limit, findings);
         }
         file = content;
     }
@@ -121,10 +137,19 @@ fn unpacked(mut file: Vec<u8>, findings: &mut Findings) -> Option<Unpacked> {
     Some(Unpacked::Text(file))
 }
 
-fn too_large<T>(what: &str, findings: &mut Findings) -> Option<T> {
-    let message = format!("{what} larger than {} MiB", MAX_FILE_BYTES >> 20);
-    let help = "save only time, drive and displacement, or every n-th sample; plain text may have any size";
-    findings.refuse(codes::RECORD_TOO_LARGE, None, message, help)
+/// Refuses a file of `size` bytes in memory, if known.
+fn too_large<T>(what: &str, size: Option<u64>, limit: MaxSize, findings: &mut Findings) -> Option<T> {
+    let most = shown_size(limit.bytes);
+    let message = match size {
+        Some(size) => format!("{what} {} in memory, more than {most}", shown_size(size)),
+        None => format!("{what} more than {FARTHEST} times as large as {most}"),
+    };
+    let mut help =
+        "save only time, drive and displacement, or every n-th sample; plain text may have any size".to_owned();
+    if let Some(size) = size.filter(|_| limit.is_option) {
+        help = format!("give `--max-size {}` to `specgen identify`, or {help}", shown_size(size));
+    }
+    findings.refuse(codes::RECORD_TOO_LARGE, None, message, &help)
 }
 
 /// The text of a data file, record or table, without a byte order mark. A binary file of tables gives the text of one.
@@ -150,11 +175,12 @@ fn read_text(path: &Path, findings: &mut Findings) -> Option<String> {
             return None;
         }
     };
-    let bytes = match unpacked(bytes, findings)? {
+    let limit = MaxSize { bytes: MAX_FILE_BYTES, is_option: false };
+    let bytes = match unpacked(bytes, limit, findings)? {
         Unpacked::Text(text) => text,
         Unpacked::Tables(kind, file) => {
             let mut text = Vec::new();
-            let (lines, _) = table(kind, file, None, findings)?;
+            let (lines, _) = table(kind, file, None, limit, findings)?;
             if !findings.is_empty() {
                 let message = "has several tables, or parts that are no numbers".to_owned();
                 let help = "save one table as CSV, or the table that `specgen identify RECORD -o table.csv` makes";
@@ -163,7 +189,7 @@ fn read_text(path: &Path, findings: &mut Findings) -> Option<String> {
             // Reading from memory cannot fail.
             let _ = lines.take(MAX_FILE_BYTES + 1).read_to_end(&mut text);
             if text.len() as u64 > MAX_FILE_BYTES {
-                return too_large("as text, is", findings);
+                return too_large("as text, is", Some(text.len() as u64), limit, findings);
             }
             text
         }
@@ -183,7 +209,7 @@ fn read_text(path: &Path, findings: &mut Findings) -> Option<String> {
 }
 
 /// The table `series` of a data file, or else the longest; `None` after the reason was reported.
-pub(crate) fn open_file(path: &Path, series: Option<&str>, findings: &mut Findings) -> Option<Source<'static>> {
+pub(crate) fn open_file(path: &Path, reading: &Reading, findings: &mut Findings) -> Option<Source<'static>> {
     let begin = || -> Result<_, ReadError> {
         let (mut file, mut first) = (files::open_file(path)?, Vec::new());
         (&mut file).take(Kind::TELLING as u64).read_to_end(&mut first)?;
@@ -192,16 +218,18 @@ pub(crate) fn open_file(path: &Path, series: Option<&str>, findings: &mut Findin
     };
     let (mut file, first) = begin().map_err(|unread| unreadable(&unread, findings)).ok()?;
     if is_packed(&first) {
-        return match files::content(file, MAX_FILE_BYTES) {
-            Ok(bytes) => Source::of_bytes(bytes, series, findings),
-            Err(ReadError::Large(_)) => too_large("is no plain text, and is", findings),
+        let limit = reading.max_size();
+        let size = file.metadata().ok().map(|found| found.len());
+        return match files::content(file, limit.bytes) {
+            Ok(bytes) => Source::of_bytes(bytes, reading, findings),
+            Err(ReadError::Large(_)) => too_large("is no plain text, and is", size, limit, findings),
             Err(unread) => {
                 unreadable(&unread, findings);
                 None
             }
         };
     }
-    let (part, choice) = part(&file, series, findings)?;
+    let (part, choice) = part(&file, reading.series(), findings)?;
     file.rewind().map_err(|error: io::Error| unreadable(&error.into(), findings)).ok()?;
     Some(Source { lines: Box::new(file), part, choice })
 }

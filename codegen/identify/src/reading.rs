@@ -13,6 +13,48 @@ pub struct Reading {
     rate: Option<f64>,
     /// Name or number of the table in a file that has several.
     series: Option<String>,
+    /// Largest size of what is unpacked in memory, bytes.
+    max_size: MaxSize,
+}
+
+/// Limit of what is unpacked in memory: of the bytes of the file, packed and unpacked, and of its numbers at 8 bytes each.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct MaxSize {
+    pub(crate) bytes: u64,
+    /// Whether the user can raise it.
+    pub(crate) is_option: bool,
+}
+
+impl Default for MaxSize {
+    fn default() -> Self {
+        Self { bytes: 2 * GB, is_option: true }
+    }
+}
+
+/// Bytes.
+const GB: u64 = 1_000_000_000;
+
+/// A size such as `4GB`, in bytes.
+///
+/// # Errors
+/// The expected form.
+pub fn size(text: &str) -> Result<u64, String> {
+    let digits = text.trim_end_matches(|c: char| c.is_ascii_alphabetic());
+    let unit = match text[digits.len()..].to_ascii_uppercase().as_str() {
+        "KB" => 1000,
+        "MB" => GB / 1000,
+        "GB" => GB,
+        "TB" => 1000 * GB,
+        _ => 0,
+    };
+    let bytes = digits.parse::<u64>().ok().and_then(|number| number.checked_mul(unit)).filter(|bytes| *bytes > 0);
+    bytes.ok_or_else(|| "expected a size such as 500MB or 4GB".to_owned())
+}
+
+/// The least such size that is not below `bytes`; up to 1 GB in MB.
+pub(crate) fn shown_size(bytes: u64) -> String {
+    let (unit, name) = if bytes <= GB { (GB / 1000, "MB") } else { (GB, "GB") };
+    format!("{}{name}", bytes.div_ceil(unit).max(1))
 }
 
 /// A column that the user names.
@@ -42,13 +84,24 @@ impl Reading {
     /// The expected form, for the first that does not have it.
     pub fn new(columns: &[String], rate: Option<f64>) -> Result<Self, String> {
         let entries = columns.iter().flat_map(|list| entries(list));
-        Ok(Self { columns: entries.map(column_choice).collect::<Result<_, _>>()?, rate, series: None })
+        Ok(Self { columns: entries.map(column_choice).collect::<Result<_, _>>()?, rate, ..Self::default() })
     }
 
     /// The same, of the table with this name or number (from 1) in a file that has several.
     #[must_use]
     pub fn of_series(self, series: Option<String>) -> Self {
         Self { series, ..self }
+    }
+
+    /// The same with another limit of the size in memory, bytes.
+    #[must_use]
+    pub fn with_max_size(self, bytes: u64) -> Self {
+        Self { max_size: MaxSize { bytes, is_option: true }, ..self }
+    }
+
+    /// Limit of the size in memory.
+    pub(crate) fn max_size(&self) -> MaxSize {
+        self.max_size
     }
 
     /// Name or number of the table.

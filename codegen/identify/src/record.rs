@@ -111,8 +111,20 @@ impl Record {
 /// All findings of the file, including warnings, if at least one refuses it.
 pub fn read_record(path: &Path, shown_as: &str, reading: &Reading) -> Result<Record, Vec<Diagnostic>> {
     let mut findings = Findings::new(shown_as);
-    match open_file(path, reading.series(), &mut findings) {
+    match open_file(path, reading, &mut findings) {
         Some(file) => of_source(file, reading, findings),
+        None => Err(findings.into_diagnostics()),
+    }
+}
+
+/// A record from the bytes of its file, of any kind.
+///
+/// # Errors
+/// As [`read_record`].
+pub fn decode_record(file: Vec<u8>, shown_as: &str, reading: &Reading) -> Result<Record, Vec<Diagnostic>> {
+    let mut findings = Findings::new(shown_as);
+    match Source::of_bytes(file, reading, &mut findings) {
+        Some(source) => of_source(source, reading, findings),
         None => Err(findings.into_diagnostics()),
     }
 }
@@ -207,6 +219,9 @@ pub(crate) fn later(time: &[f64], values: &[f64], delay: f64) -> Vec<f64> {
 #[cfg(test)]
 #[path = "record/tests/files.rs"]
 mod files;
+#[cfg(test)]
+#[path = "record/tests/hostile.rs"]
+mod hostile;
 #[cfg(test)]
 #[path = "record/tests/labs.rs"]
 mod labs;

@@ -66,8 +66,9 @@ pub enum Input<'a> {
 pub(crate) fn read(input: Input, shown_as: &str, wanted: &[ColumnSpec]) -> Result<Signals, Vec<Diagnostic>> {
     let mut findings = Findings::new(shown_as);
     let signals = match input {
-        Input::File(path, reading) => open_file(path, reading.series(), &mut findings)
-            .and_then(|file| checked(file, wanted, reading, &mut findings)),
+        Input::File(path, reading) => {
+            open_file(path, reading, &mut findings).and_then(|file| checked(file, wanted, reading, &mut findings))
+        }
         Input::Text(text) => Source::of_text(text.as_bytes(), None, &mut findings)
             .and_then(|text| checked(text, wanted, &Reading::default(), &mut findings)),
     };

@@ -1,6 +1,8 @@
 //! What takes bytes from outside, and what must hold whatever they are. A target panics where it does not.
 
+pub mod container;
 mod link;
+mod memory;
 mod record;
 
 use std::path::PathBuf;
@@ -16,8 +18,17 @@ use specgen::{lint, waveform};
 type Target = (&'static str, fn(&[u8]));
 
 /// All targets.
-pub const TARGETS: [Target; 5] =
-    [("spec", spec), ("csv", csv), ("record", record::record), ("link", link::link), ("operator", operator)];
+pub const TARGETS: [Target; 9] = [
+    ("spec", spec),
+    ("csv", csv),
+    ("mat", container::mat),
+    ("hdf5", container::hdf5),
+    ("tdms", container::tdms),
+    ("packed", container::packed),
+    ("record", record::record),
+    ("link", link::link),
+    ("operator", operator),
+];
 
 /// A spec is accepted, or refused with findings that can be shown; what is accepted has a physical lint.
 fn spec(input: &[u8]) {

@@ -5,7 +5,7 @@
 
 use clap::{Arg, Args, Subcommand};
 use specgen_identify::mode::Mode;
-use specgen_identify::{DeadTime, Reading};
+use specgen_identify::{DeadTime, Reading, size};
 use specgen_language::model::LegModelKind;
 use specgen_language::outcome::Failure;
 use specgen_language::output::check_place;
@@ -62,7 +62,7 @@ struct EverettArguments {
     #[arg(long, value_name = "MIN:MAX", value_parser = range, allow_hyphen_values = true)]
     drive: Option<[f64; 2]>,
     /// The spec that the target of a recorded run was built from. It has the range and the grid.
-    #[arg(long, value_name = "SPEC", conflicts_with_all = ["drive", "grid", "dead_time", "model", "validate", "columns", "rate", "series", "plot"])]
+    #[arg(long, value_name = "SPEC", conflicts_with_all = ["drive", "grid", "dead_time", "model", "validate", "columns", "rate", "series", "max_size", "plot"])]
     spec: Option<InputFile>,
     /// Cells per axis of the Preisach grid; chosen by cross-validation over whole curves if not given.
     #[arg(long, value_name = "N", value_parser = grid, allow_negative_numbers = true)]
@@ -229,6 +229,9 @@ struct BenchArguments {
     /// Table to read of a file that has several, by number (from 1) or name; the longest if not given.
     #[arg(long, value_name = "N|NAME")]
     series: Option<String>,
+    /// Largest size in memory of a record that is packed or binary, such as 500MB or 4GB; its numbers take 8 bytes each.
+    #[arg(long, value_name = "SIZE", value_parser = size, default_value = "2GB")]
+    max_size: u64,
     #[command(flatten)]
     plot: Plot,
 }
@@ -237,7 +240,8 @@ impl BenchArguments {
     fn bench(&self) -> Result<Bench, Failure> {
         let reading = Reading::new(&self.columns, self.rate);
         let reading = reading.map_err(|why| Failure::Usage(format!("--columns: {why}")))?;
-        Ok(Bench { reading: reading.of_series(self.series.clone()), plot: self.plot.place() })
+        let reading = reading.of_series(self.series.clone()).with_max_size(self.max_size);
+        Ok(Bench { reading, plot: self.plot.place() })
     }
 }
 

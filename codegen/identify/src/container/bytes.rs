@@ -1,7 +1,76 @@
 //! Reads the bytes of a file in sequence, and numbers from them.
 
+use std::io::{self, Read};
+
 /// Error message for a file that ends early.
 pub(super) const DAMAGED: &str = "it is damaged or cut off";
+
+/// Most arrays of a file, with its texts and whatever else has a name.
+pub(super) const MOST_ARRAYS: usize = 10_000;
+
+/// Reason why a file is not read.
+#[derive(Debug)]
+pub(crate) enum Refusal {
+    /// A text that follows "cannot be read:".
+    Because(String),
+    /// More bytes than are permitted: this many, if known.
+    Large(Option<u64>),
+}
+
+impl From<String> for Refusal {
+    fn from(text: String) -> Self {
+        Self::Because(text)
+    }
+}
+
+impl From<&str> for Refusal {
+    fn from(text: &str) -> Self {
+        Self::Because(text.to_owned())
+    }
+}
+
+/// Times its limit that a size is counted to.
+pub(crate) const FARTHEST: u64 = 8;
+
+/// Number of bytes that `unpacked` gives, of which the first `limit` are added to `into`; none if there are more than
+/// `farthest`.
+///
+/// # Errors
+/// Those of the reader.
+pub(crate) fn unpack(
+    mut unpacked: impl Read,
+    limit: u64,
+    farthest: u64,
+    into: &mut Vec<u8>,
+) -> io::Result<Option<u64>> {
+    let kept = (&mut unpacked).take(limit).read_to_end(into)? as u64;
+    let left = farthest.saturating_sub(kept);
+    let more = io::copy(&mut unpacked.take(left.saturating_add(1)), &mut io::sink())?;
+    Ok((more <= left).then_some(kept + more))
+}
+
+/// Space for numbers, which are counted before they are stored.
+pub(crate) struct Space {
+    limit: u64,
+    used: u64,
+}
+
+impl Space {
+    pub(crate) fn new(limit: u64) -> Self {
+        Self { limit, used: 0 }
+    }
+
+    /// Whether there is space for more numbers.
+    pub(super) fn has(&mut self, numbers: usize) -> bool {
+        self.used = self.used.saturating_add((numbers as u64).saturating_mul(8));
+        self.used <= self.limit
+    }
+
+    /// An error if there was not enough.
+    pub(super) fn check(&self) -> Result<(), Refusal> {
+        if self.used > self.limit { Err(Refusal::Large(Some(self.used))) } else { Ok(()) }
+    }
+}
 
 /// The rest of a file or of a part of it.
 #[derive(Clone, Copy)]

@@ -1,7 +1,8 @@
 //! HDF5 files, with those of MATLAB 7.3: the datasets of the file and of its groups.
 
-use hdf5_pure::{AttrValue, Dataset, Error, File, Group};
+use hdf5_pure::{AttrValue, DType, Dataset, Error, File, Group};
 
+use super::bytes::{MOST_ARRAYS, Refusal, Space};
 use super::{Array, Contents};
 
 /// Classes of MATLAB that have no numbers, though they are stored as numbers.
@@ -9,40 +10,52 @@ const NO_NUMBERS: [&str; 4] = ["char", "cell", "string", "function_handle"];
 /// Levels of groups that are read, and number of groups: links may make a circle.
 const DEEPEST: usize = 4;
 const MOST_GROUPS: usize = 1000;
-/// Most numbers that are read: a small file can declare many that were never written, and several links to them.
-const MOST_NUMBERS: usize = 1 << 26;
+/// Most bytes that deflate unpacks from one. A dataset that is larger than all of the file can hold was never written.
+const MOST_PER_BYTE: usize = 1032;
 
-pub(super) fn contents(file: Vec<u8>) -> Result<Contents, String> {
+/// What may still be read: groups, numbers, and the largest dataset, bytes.
+struct Left {
+    groups: usize,
+    space: Space,
+    largest: usize,
+}
+
+pub(super) fn contents(file: Vec<u8>, limit: u64) -> Result<Contents, Refusal> {
+    let largest = file.len().saturating_mul(MOST_PER_BYTE);
     let file = File::from_bytes(file).map_err(|error| error.to_string())?;
     let mut contents = Contents::default();
-    let mut left = (MOST_GROUPS, MOST_NUMBERS);
+    let mut left = Left { groups: MOST_GROUPS, space: Space::new(limit), largest };
     add(&file.root(), "", 0, &mut left, &mut contents).map_err(|error| error.to_string())?;
+    left.space.check()?;
     Ok(contents)
 }
 
 /// Adds the datasets of `group`, which is called `path`, and of its groups.
-fn add(
-    group: &Group,
-    path: &str,
-    depth: usize,
-    left: &mut (usize, usize),
-    contents: &mut Contents,
-) -> Result<(), Error> {
-    for name in group.datasets()? {
-        match group.dataset(&name).ok().and_then(|data| numbers(&data, &mut left.1)) {
+fn add(group: &Group, path: &str, depth: usize, left: &mut Left, contents: &mut Contents) -> Result<(), Error> {
+    // By these walks, as opening one by its name searches the whole group.
+    let datasets = group.iter_datasets()?;
+    if contents.arrays.len() + contents.others.len() + datasets.len() > MOST_ARRAYS {
+        contents.is_full = true;
+        return Ok(());
+    }
+    for (name, data) in datasets {
+        match numbers(&data, left) {
             Some((size, values)) => contents.arrays.push(Array { group: path.to_owned(), name, size, values }),
             None => contents.others.push((name, "no array of numbers that can be read".to_owned())),
         }
     }
     // Names of MATLAB's internal objects begin so.
-    for name in group.groups()?.into_iter().filter(|name| !name.starts_with('#')) {
-        if depth == DEEPEST || left.0 == 0 {
+    for (name, group) in group.iter_groups()?.filter(|(name, _)| !name.starts_with('#')) {
+        if contents.is_full() {
+            break;
+        }
+        if depth == DEEPEST || left.groups == 0 {
             contents.others.push((name, "a group".to_owned()));
             continue;
         }
-        left.0 -= 1;
+        left.groups -= 1;
         let below = if path.is_empty() { name.clone() } else { format!("{path}/{name}") };
-        let added = group.group(&name).and_then(|group| add(&group, &below, depth + 1, left, contents));
+        let added = add(&group, &below, depth + 1, left, contents);
         if let Err(error) = added {
             contents.others.push((name, format!("not readable: {error}")));
         }
@@ -51,7 +64,7 @@ fn add(
 }
 
 /// Size and values of an array of numbers; none for texts and tables, or beyond what is `left` to read.
-fn numbers(data: &Dataset, left: &mut usize) -> Option<(Vec<usize>, Vec<f64>)> {
+fn numbers(data: &Dataset, left: &mut Left) -> Option<(Vec<usize>, Vec<f64>)> {
     let attributes = data.attrs().ok()?;
     let class = attributes.get("MATLAB_class").and_then(AttrValue::as_str);
     if class.is_some_and(|class| NO_NUMBERS.contains(&class)) {
@@ -62,7 +75,21 @@ fn numbers(data: &Dataset, left: &mut usize) -> Option<(Vec<usize>, Vec<f64>)> {
         data.shape().ok()?.into_iter().rev().map(|length| usize::try_from(length).ok()).collect();
     let size = size?;
     let count = size.iter().try_fold(1_usize, |count, length| count.checked_mul(*length))?;
-    *left = left.checked_sub(count)?;
+    use DType::{Array, Compound, ObjectReference, String, VariableLengthString};
+    if matches!(data.dtype().ok()?, Array(..) | Compound(_) | ObjectReference | String | VariableLengthString) {
+        return None;
+    }
+    // A chunk is unpacked as a whole.
+    let chunk = data.chunk_shape().ok()?.unwrap_or_default();
+    let chunk = chunk.into_iter().try_fold(1, |count, length| usize::try_from(length).ok()?.checked_mul(count))?;
+    let most = if count > chunk { count } else { chunk };
+    if most.checked_mul(usize::try_from(data.element_size().ok()?).ok()?)? > left.largest {
+        return None;
+    }
+    if !left.space.has(most) {
+        // Counted only.
+        return Some((size, Vec::new()));
+    }
     Some((size, data.read_f64().ok()?))
 }
 
@@ -80,7 +107,7 @@ mod tests {
         outer.create_dataset("count").with_i32_data(&[7]);
         outer.create_dataset("matrix").with_f64_data(&[1.0, 2.0, 3.0, 4.0, 5.0, 6.0]).with_shape(&[3, 2]);
         builder.add_group(outer.finish());
-        let found = contents(builder.finish().unwrap()).unwrap();
+        let found = contents(builder.finish().unwrap(), u64::MAX).unwrap();
         let arrays: Vec<_> = found.arrays.iter().map(|a| (a.group.as_str(), a.name.as_str(), &a.size[..])).collect();
         assert_eq!(arrays, [("scan", "count", &[1][..]), ("scan", "matrix", &[2, 3])]);
         assert_eq!(found.others, [("operator".to_owned(), "no array of numbers that can be read".to_owned())]);

@@ -3,13 +3,12 @@
 //! Structs give their arrays. An array with a text beside it is called by that text, as dSPACE writes it: `X.Data` is the
 //! time in s, and each `Y(k).Data` a signal with the name `Y(k).Name`.
 
-use std::io::Read;
 use std::ops::RangeInclusive;
 
 use flate2::read::ZlibDecoder;
 
-use super::bytes::{Bytes, DAMAGED};
-use super::{Array, Contents, LARGEST};
+use super::bytes::{Bytes, DAMAGED, FARTHEST, MOST_ARRAYS, Refusal, Space, unpack};
+use super::{Array, Contents};
 use specgen_language::arrays::COMMENT;
 
 /// Name of a time in s.
@@ -28,6 +27,8 @@ const STRUCT: u8 = 2;
 const TEXT: u8 = 4;
 /// Objects of classes: texts in double quotes, time series, tables.
 const OPAQUE: u8 = 17;
+/// Most dimensions of an array.
+const MOST_DIMENSIONS: usize = 32;
 /// Levels of structs that are read.
 const DEEPEST: usize = 6;
 
@@ -84,12 +85,13 @@ fn text(from: &mut Bytes) -> Result<String, String> {
     if !matches!(kind, 4 | 17) {
         return Ok(String::from_utf8_lossy(rest).trim_end_matches('\0').to_owned());
     }
-    let units: Vec<u16> = Bytes { rest, ..*from }.numbers(('u', 2)).into_iter().map(|unit| unit as u16).collect();
-    Ok(String::from_utf16_lossy(&units))
+    let read = if from.is_big_endian { u16::from_be_bytes } else { u16::from_le_bytes };
+    let units = rest.as_chunks().0.iter().map(|unit| read(*unit));
+    Ok(char::decode_utf16(units).map(|letter| letter.unwrap_or(char::REPLACEMENT_CHARACTER)).collect())
 }
 
 /// Name and value of an array with these parts.
-fn variable(mut parts: Bytes, depth: usize) -> Result<(String, Value), String> {
+fn variable(mut parts: Bytes, depth: usize, space: &mut Space) -> Result<(String, Value), String> {
     if parts.rest.is_empty() {
         return Ok((String::new(), Value::Numbers(Vec::new(), Vec::new(), false)));
     }
@@ -101,11 +103,16 @@ fn variable(mut parts: Bytes, depth: usize) -> Result<(String, Value), String> {
         return Ok((name, Value::Other(format!("an object of class {class}"))));
     }
     // Lengths are integers.
-    let size: Vec<usize> = numbers(&mut parts)?.into_iter().map(|length| length as usize).collect();
+    let lengths = numbers(&mut parts)?;
+    if lengths.len() > MOST_DIMENSIONS {
+        return Err(DAMAGED.to_owned());
+    }
+    let size: Vec<usize> = lengths.into_iter().map(|length| length as usize).collect();
     let count = size.iter().try_fold(1_usize, |count, length| count.checked_mul(*length)).ok_or(DAMAGED)?;
     let name = text(&mut parts)?;
     let value = match class {
         // For complex numbers, the real part.
+        class if NUMBERS.contains(&class) && !space.has(count) => Value::Other(String::new()),
         class if NUMBERS.contains(&class) => {
             let values = numbers(&mut parts)?;
             if count != values.len() {
@@ -122,10 +129,14 @@ fn variable(mut parts: Bytes, depth: usize) -> Result<(String, Value), String> {
                 String::from_utf8_lossy(&name[..end]).into_owned()
             };
             let fields: Vec<String> = names.chunks_exact(longest.max(1)).map(field).collect();
+            let count = count.checked_mul(fields.len()).ok_or(DAMAGED)?;
+            if count > MOST_ARRAYS {
+                return Ok((name, Value::Other(format!("a struct of {count} values"))));
+            }
             let mut values = Vec::new();
-            for _ in 0..count.checked_mul(fields.len()).ok_or(DAMAGED)? {
+            for _ in 0..count {
                 let (_, rest) = element(&mut parts)?;
-                values.push(variable(Bytes { rest, ..parts }, depth + 1)?.1);
+                values.push(variable(Bytes { rest, ..parts }, depth + 1, space)?.1);
             }
             Value::Structs(fields, values)
         }
@@ -182,27 +193,35 @@ fn add_structs(group: &str, name: &str, fields: &[String], values: Vec<Value>, c
 }
 
 /// The arrays of a file.
-pub(super) fn contents(file: &[u8]) -> Result<Contents, String> {
+///
+/// # Errors
+/// Why it is not read.
+pub(super) fn contents(file: &[u8], limit: u64) -> Result<Contents, Refusal> {
     let (header, rest) = file.split_at_checked(HEADER).ok_or(DAMAGED)?;
     let mut file = Bytes { rest, is_big_endian: header.ends_with(b"MI") };
     let mut contents = Contents::default();
-    let mut size = 0;
-    while !file.rest.is_empty() {
+    let (mut space, mut unpacked) = (Space::new(limit), 0);
+    while !file.rest.is_empty() && !contents.is_full() {
         let (mut kind, mut rest) = element(&mut file)?;
         let mut inflated = Vec::new();
         if kind == COMPRESSED {
-            let limit = LARGEST - size;
-            ZlibDecoder::new(rest).take(limit + 1).read_to_end(&mut inflated).map_err(|error| error.to_string())?;
-            size += inflated.len() as u64;
-            if size > LARGEST {
-                return Err(format!("unpacked, it is larger than {} MiB", LARGEST >> 20));
+            let (left, farthest) = (limit.saturating_sub(unpacked), limit.saturating_mul(FARTHEST) - unpacked);
+            let there = unpack(ZlibDecoder::new(rest), left, farthest, &mut inflated);
+            unpacked += there.map_err(|error| error.to_string())?.ok_or(Refusal::Large(None))?;
+            if unpacked > limit {
+                // Counted only.
+                continue;
             }
             (kind, rest) = element(&mut Bytes { rest: &inflated, ..file })?;
         }
         if kind == ARRAY {
-            let (name, value) = variable(Bytes { rest, ..file }, 0)?;
+            let (name, value) = variable(Bytes { rest, ..file }, 0, &mut space)?;
             add("", &name, value, &mut contents);
         }
     }
+    if unpacked > limit {
+        return Err(Refusal::Large(Some(unpacked)));
+    }
+    space.check()?;
     Ok(contents)
 }

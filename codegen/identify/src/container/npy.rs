@@ -1,11 +1,10 @@
 //! Arrays of NumPy (NEP 1): a header that describes them, then their values.
 
-use super::bytes::{Bytes, DAMAGED};
-use super::{Array, Contents, LARGEST};
+use super::bytes::{Bytes, DAMAGED, FARTHEST, Refusal, Space, unpack};
+use super::{Array, Contents};
 use flate2::read::DeflateDecoder;
 use rawzip::{CompressionMethod, ZipArchive};
 use specgen_language::arrays::COMMENT;
-use std::io::Read;
 
 /// Bytes of magic and version.
 const VERSION: usize = 8;
@@ -18,7 +17,15 @@ struct Field {
 }
 
 /// The columns of a file: the fields of a structured array, or the columns of one or two dimensions.
-pub(super) fn contents(file: &[u8]) -> Result<Contents, String> {
+pub(super) fn contents(file: &[u8], limit: u64) -> Result<Contents, Refusal> {
+    let mut space = Space::new(limit);
+    let contents = array(file, &mut space)?;
+    space.check()?;
+    Ok(contents)
+}
+
+/// The columns of an array; none if there is no space for them.
+fn array(file: &[u8], space: &mut Space) -> Result<Contents, String> {
     let (version, rest) = file.split_at_checked(VERSION).ok_or(DAMAGED)?;
     let mut rest = Bytes { rest, is_big_endian: false };
     let length = if version[6] == 1 {
@@ -42,6 +49,9 @@ pub(super) fn contents(file: &[u8]) -> Result<Contents, String> {
         return Err("it has more than one array, or its header is damaged".to_owned());
     }
     let mut contents = Contents::default();
+    if !space.has(count.saturating_mul(fields.len())) {
+        return Ok(contents);
+    }
     let mut at = 0;
     for Field { name, form, is_big_endian } in fields {
         let of_field: Vec<u8>;
@@ -81,26 +91,32 @@ pub(super) fn is_archive(first: &[u8]) -> bool {
 }
 
 /// The arrays of an archive, which are called as their files.
-pub(super) fn of_archive(file: &[u8]) -> Result<Contents, String> {
+pub(super) fn of_archive(file: &[u8], limit: u64) -> Result<Contents, Refusal> {
     let archive = ZipArchive::from_slice(file).map_err(|_| DAMAGED)?;
     let mut contents = Contents::default();
-    let mut left = LARGEST;
+    let (mut space, mut unpacked) = (Space::new(limit), 0);
     for entry in archive.entries() {
+        if contents.is_full() {
+            break;
+        }
         let entry = entry.map_err(|_| DAMAGED)?;
         let path = String::from_utf8_lossy(entry.file_path().as_ref()).into_owned();
         let Some(name) = path.strip_suffix(".npy") else { continue };
         let method = entry.compression_method();
         let data = archive.get_entry(entry.wayfinder()).map_err(|_| DAMAGED)?.data();
-        let mut unpacked = Vec::new();
-        let read = match method {
-            CompressionMethod::STORE => data.take(left + 1).read_to_end(&mut unpacked),
-            CompressionMethod::DEFLATE => DeflateDecoder::new(data).take(left + 1).read_to_end(&mut unpacked),
-            _ => return Err("it is packed in an unusual way: write it with numpy.savez".to_owned()),
+        let (left, farthest) = (limit.saturating_sub(unpacked), limit.saturating_mul(FARTHEST) - unpacked);
+        let mut bytes = Vec::new();
+        let there = match method {
+            CompressionMethod::STORE => unpack(data, left, farthest, &mut bytes),
+            CompressionMethod::DEFLATE => unpack(DeflateDecoder::new(data), left, farthest, &mut bytes),
+            _ => return Err("it is packed in an unusual way: write it with numpy.savez".into()),
         };
-        read.map_err(|_| DAMAGED)?;
-        let size = unpacked.len() as u64;
-        left = left.checked_sub(size).ok_or(format!("unpacked, it is larger than {} MiB", LARGEST >> 20))?;
-        match self::contents(&unpacked) {
+        unpacked += there.map_err(|_| DAMAGED)?.ok_or(Refusal::Large(None))?;
+        if unpacked > limit {
+            // Counted only.
+            continue;
+        }
+        match array(&bytes, &mut space) {
             Ok(found) => {
                 contents.comment = contents.comment.or(found.comment.filter(|_| name == COMMENT));
                 let is_comment = name == COMMENT && contents.comment.is_some();
@@ -112,6 +128,10 @@ pub(super) fn of_archive(file: &[u8]) -> Result<Contents, String> {
             Err(why) => contents.others.push((name.to_owned(), why)),
         }
     }
+    if unpacked > limit {
+        return Err(Refusal::Large(Some(unpacked)));
+    }
+    space.check()?;
     Ok(contents)
 }
 
@@ -178,19 +198,19 @@ mod tests {
         let descr = "[('time_s', '<f8'), ('n', '|b1'), ('drive [V] (a)', '>i2')]";
         let header = format!("{{'descr': {descr}, 'fortran_order': False, 'shape': (2,), }}\n");
         let row = |t: f64, u: i16| [&t.to_le_bytes()[..], &[1], &u.to_be_bytes()].concat();
-        let found = contents(&file(&header, &[row(0.5, -3), row(1.5, 4)].concat())).unwrap();
+        let found = contents(&file(&header, &[row(0.5, -3), row(1.5, 4)].concat()), u64::MAX).unwrap();
         let columns: Vec<_> = found.arrays.iter().map(|array| (array.name.as_str(), array.values.clone())).collect();
         assert_eq!(columns, [("time_s", vec![0.5, 1.5]), ("drive [V] (a)", vec![-3.0, 4.0])]);
         assert_eq!(found.others[0].0, "n");
         for (order, size) in [("True", [3, 2]), ("False", [2, 3])] {
             let header = format!("{{'descr': '<f4', 'fortran_order': {order}, 'shape': (3, 2), }}\n");
             let values: Vec<u8> = (0..6_u8).flat_map(|k| f32::from(k).to_le_bytes()).collect();
-            let found = contents(&file(&header, &values)).unwrap();
+            let found = contents(&file(&header, &values), u64::MAX).unwrap();
             assert_eq!((&found.arrays[0].size[..], found.arrays[0].values[5]), (&size[..], 5.0));
-            assert!(contents(&file(&header, &values[1..])).is_err());
+            assert!(contents(&file(&header, &values[1..]), u64::MAX).is_err());
         }
         for bad in ["{'descr': '<c16', 'shape': (2,)}", "{'descr': [('a', '<f8', (3,))], 'shape': (2,)}", "{}"] {
-            assert!(contents(&file(bad, &[0; 99])).is_err(), "{bad}");
+            assert!(contents(&file(bad, &[0; 99]), u64::MAX).is_err(), "{bad}");
         }
     }
 }

@@ -1,7 +1,9 @@
 //! TDMS files (NI, TDMS File Format Internal Structure): segments, each with the changes of its objects, and their
 //! values.
 
-use super::bytes::{Bytes, DAMAGED};
+use std::collections::BTreeMap;
+
+use super::bytes::{Bytes, DAMAGED, MOST_ARRAYS, Refusal, Space};
 use super::{Array, Contents};
 
 /// What a segment has.
@@ -21,6 +23,73 @@ struct Object {
     /// Bytes of all its values in a chunk.
     size: usize,
     values: Vec<f64>,
+    /// Its key in [`Objects::listed`].
+    listed: Option<u64>,
+}
+
+/// The objects of a file.
+#[derive(Default)]
+struct Objects {
+    all: Vec<Object>,
+    /// Indices by path.
+    places: BTreeMap<String, usize>,
+    /// Indices of the objects with values, in their order.
+    listed: BTreeMap<u64, usize>,
+    /// Next key in `listed`.
+    next: u64,
+}
+
+impl Objects {
+    /// Index of the object with this path, a new one if there is none.
+    fn place(&mut self, path: String) -> usize {
+        let place = *self.places.entry(path.clone()).or_insert(self.all.len());
+        if place == self.all.len() {
+            self.all.push(Object { path, kind: TEXT, size: 0, values: Vec::new(), listed: None });
+        }
+        place
+    }
+
+    fn list(&mut self, place: usize) {
+        if self.all[place].listed.is_none() {
+            self.listed.insert(self.next, place);
+            self.all[place].listed = Some(self.next);
+            self.next += 1;
+        }
+    }
+
+    fn unlist(&mut self, place: usize) {
+        if let Some(key) = self.all[place].listed.take() {
+            self.listed.remove(&key);
+        }
+    }
+
+    fn unlist_all(&mut self) {
+        for place in std::mem::take(&mut self.listed).into_values() {
+            self.all[place].listed = None;
+        }
+    }
+
+    /// Those with bytes in each chunk, with the bytes of all of them and of a value of each.
+    fn in_chunk(&self) -> Result<Chunk, String> {
+        let mut chunk = Chunk::default();
+        for place in self.listed.values() {
+            let Object { size, kind, .. } = self.all[*place];
+            if size > 0 {
+                chunk.places.push(*place);
+                chunk.size = chunk.size.checked_add(size).ok_or(DAMAGED)?;
+                chunk.row += width(kind)?;
+            }
+        }
+        Ok(chunk)
+    }
+}
+
+/// Layout of a chunk.
+#[derive(Default)]
+struct Chunk {
+    places: Vec<usize>,
+    size: usize,
+    row: usize,
 }
 
 /// Flags, of a byte each, and times.
@@ -53,28 +122,26 @@ fn text(from: &mut Bytes) -> Result<String, String> {
     Ok(String::from_utf8_lossy(from.take(length)?).into_owned())
 }
 
-/// Reads the changes of `objects`. `listed` are the indices of the objects with values, in their order.
-fn read_objects(mut from: Bytes, objects: &mut Vec<Object>, listed: &mut Vec<usize>) -> Result<(), String> {
+/// Reads the changes of `objects`.
+fn read_objects(mut from: Bytes, objects: &mut Objects) -> Result<(), String> {
     for _ in 0..from.word()? {
-        let path = text(&mut from)?;
-        let place = objects.iter().position(|object| object.path == path).unwrap_or(objects.len());
-        if place == objects.len() {
-            objects.push(Object { path, kind: TEXT, size: 0, values: Vec::new() });
+        let place = objects.place(text(&mut from)?);
+        if place > MOST_ARRAYS {
+            return Err(format!("it has more than {MOST_ARRAYS} channels and groups"));
         }
         match from.word()? {
-            u32::MAX => listed.retain(|other| *other != place),
+            u32::MAX => objects.unlist(place),
             given => {
+                let object = &mut objects.all[place];
                 // Zero: as it was.
                 if given > 0 {
-                    objects[place].kind = from.word()?;
+                    let kind = from.word()?;
+                    object.kind = kind;
                     let (_, count) = (from.word()?, from.count()?);
-                    let kind = objects[place].kind;
                     let size = if kind == TEXT { Some(from.count()?) } else { count.checked_mul(width(kind)?) };
-                    objects[place].size = size.ok_or(DAMAGED)?;
+                    object.size = size.ok_or(DAMAGED)?;
                 }
-                if !listed.contains(&place) {
-                    listed.push(place);
-                }
+                objects.list(place);
             }
         }
         // Properties: a name, a type, a value.
@@ -97,13 +164,14 @@ fn read_objects(mut from: Bytes, objects: &mut Vec<Object>, listed: &mut Vec<usi
 }
 
 /// The channels of a file.
-pub(super) fn contents(file: &[u8]) -> Result<Contents, String> {
-    let (mut objects, mut listed) = (Vec::<Object>::new(), Vec::new());
+pub(super) fn contents(file: &[u8], limit: u64) -> Result<Contents, Refusal> {
+    let (mut objects, mut space) = (Objects::default(), Space::new(limit));
+    let mut chunk = Chunk::default();
     let mut file = Bytes { rest: file, is_big_endian: false };
     let mut is_interrupted = false;
     while !file.rest.is_empty() {
         if file.take(4)? != b"TDSm" {
-            return Err(DAMAGED.to_owned());
+            return Err(DAMAGED.into());
         }
         file.is_big_endian = false;
         let has = file.word()?;
@@ -114,40 +182,41 @@ pub(super) fn contents(file: &[u8]) -> Result<Contents, String> {
         let segment = file.take(if length == usize::MAX { file.rest.len() } else { length })?;
         let (rest, values) = segment.split_at_checked(before_values).ok_or(DAMAGED)?;
         if has & OBJECTS_ALL_NEW > 0 {
-            listed.clear();
+            objects.unlist_all();
+            chunk = Chunk::default();
         }
         if has & OBJECTS > 0 {
-            read_objects(Bytes { rest, ..file }, &mut objects, &mut listed)?;
+            read_objects(Bytes { rest, ..file }, &mut objects)?;
+            chunk = objects.in_chunk()?;
         }
-        let size =
-            listed.iter().try_fold(0_usize, |sum, place| sum.checked_add(objects[*place].size)).ok_or(DAMAGED)?;
-        if has & VALUES == 0 || size == 0 {
+        if has & VALUES == 0 || chunk.size == 0 {
             continue;
         }
-        let mut row = 0;
-        for place in &listed {
-            row += width(objects[*place].kind)?;
-        }
-        for chunk in values.chunks_exact(size) {
+        let is_interleaved = has & INTERLEAVED > 0;
+        for values in values.chunks_exact(chunk.size) {
             let mut at = 0;
-            for place in &listed {
-                let object = &mut objects[*place];
-                let own = if has & INTERLEAVED > 0 { width(object.kind)? } else { object.size };
-                let step = if has & INTERLEAVED > 0 { row } else { size };
-                let bytes: Vec<u8> =
-                    chunk.chunks_exact(step.max(1)).flat_map(|row| row.get(at..at + own)).flatten().copied().collect();
+            for place in &chunk.places {
+                let object = &mut objects.all[*place];
+                let own = if is_interleaved { width(object.kind)? } else { object.size };
+                let step = if is_interleaved { chunk.row } else { chunk.size };
+                let rows = values.chunks_exact(step.max(1));
+                let from = at;
                 at += own;
-                if let Some(form) = form(object.kind) {
-                    object.values.extend(Bytes { rest: &bytes, ..file }.numbers(form));
+                let Some(form) = form(object.kind) else { continue };
+                if !space.has(rows.len() * (own / form.1)) {
+                    continue;
                 }
+                let bytes: Vec<u8> = rows.flat_map(|row| row.get(from..from + own)).flatten().copied().collect();
+                object.values.extend(Bytes { rest: &bytes, ..file }.numbers(form));
             }
         }
     }
+    space.check()?;
     let mut contents = Contents::default();
     if is_interrupted {
         contents.others.push(("end of the file".to_owned(), "its writer was interrupted there".to_owned()));
     }
-    for Object { path, kind, values, .. } in objects {
+    for Object { path, kind, values, .. } in objects.all {
         // The path of a channel is `/'group'/'channel'`, with quotes in names doubled.
         let Some((group, name)) = path.rsplit_once("'/'") else { continue };
         let plain = |name: &str| name.trim_start_matches("/'").trim_end_matches('\'').replace("''", "'");
@@ -192,7 +261,7 @@ mod tests {
         let property = |status: &str| [text("NI_Scaling_Status"), word(TEXT), text(status)].concat();
         let read = |status: &str| {
             let object = [word(1), text("/'scan'/'a'"), word(u32::MAX), word(1), property(status)].concat();
-            read_objects(Bytes { rest: &object, is_big_endian: false }, &mut Vec::new(), &mut Vec::new())
+            read_objects(Bytes { rest: &object, is_big_endian: false }, &mut Objects::default())
         };
         assert_eq!(read("scaled"), Ok(()));
         assert!(read("unscaled").unwrap_err().contains("save them scaled"));
@@ -216,10 +285,10 @@ mod tests {
         ];
         let expected = [0.0, 1.0, 2.0, 3.0, 0.0, 1.0, 0.0, 1.0, 2.0, 3.0].to_vec();
         let wanted = ["a", "it's b"].map(|name| ("scan".to_owned(), name.to_owned(), expected.clone()));
-        let found = contents(&file.concat()).unwrap().arrays.into_iter();
+        let found = contents(&file.concat(), u64::MAX).unwrap().arrays.into_iter();
         assert_eq!(found.map(|array| (array.group, array.name, array.values)).collect::<Vec<_>>(), wanted);
         let mut other = file.concat();
         other.pop();
-        assert!(contents(&other).is_err());
+        assert!(contents(&other, u64::MAX).is_err());
     }
 }

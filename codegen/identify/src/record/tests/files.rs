@@ -31,11 +31,7 @@ pub(super) fn read(bytes: &[u8], columns: &[&str], rate: Option<f64>) -> Result<
 }
 
 pub(super) fn read_as(bytes: &[u8], reading: &Reading) -> Result<Record, Vec<Diagnostic>> {
-    let mut findings = Findings::new("r.csv");
-    match Source::of_bytes(bytes.to_vec(), reading.series(), &mut findings) {
-        Some(source) => of_source(source, reading, findings),
-        None => Err(findings.into_diagnostics()),
-    }
+    decode_record(bytes.to_vec(), "r.csv", reading)
 }
 
 pub(super) fn assert_same(name: &str, found: Result<Record, Vec<Diagnostic>>) -> Record {
@@ -202,7 +198,7 @@ fn what_is_refused_says_what_is_then_taken() {
     }
 }
 
-fn containers() -> std::path::PathBuf {
+pub(super) fn containers() -> std::path::PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("src/record/tests/containers")
 }
 
