@@ -96,7 +96,7 @@ fn check_with_python(folder: &Folder) {
     for name in ["leg", "table", "predicted"] {
         for form in ["npz", "mat"] {
             let output =
-                Command::new(&python).args(["-c", DUMP]).arg(folder.path(&format!("{name}.{form}"))).output().unwrap();
+                Command::new(&python).args(["-c", DUMP]).arg(folder.path(format!("{name}.{form}"))).output().unwrap();
             let text = String::from_utf8(output.stdout).unwrap();
             assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
             for (title, bits) in columns(&folder.read(&format!("{name}.csv"))) {
