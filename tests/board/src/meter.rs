@@ -73,8 +73,6 @@ impl Meter {
     pub fn text(&self) -> String {
         let (ticks, tick_us) = (self.ticks.count, self.ticks.text(microseconds));
         let (instructions, latency) = (self.instructions.text(|count| count as f64), self.latency.text(microseconds));
-        format!(
-            "ticks={ticks} tick_us={tick_us} instructions={instructions} convst_to_ldac_us={latency}"
-        )
+        format!("ticks={ticks} tick_us={tick_us} instructions={instructions} convst_to_ldac_us={latency}")
     }
 }
