@@ -51,9 +51,13 @@ pub fn size(text: &str) -> Result<u64, String> {
     bytes.ok_or_else(|| "expected a size such as 500MB or 4GB".to_owned())
 }
 
-/// The least such size that is not below `bytes`; up to 1 GB in MB.
+/// The least such size that is not below `bytes`: below 1 MB in kB, up to 1 GB in MB.
 pub(crate) fn shown_size(bytes: u64) -> String {
-    let (unit, name) = if bytes <= GB { (GB / 1000, "MB") } else { (GB, "GB") };
+    let (unit, name) = match bytes {
+        ..1_000_000 => (1000, "kB"),
+        ..=GB => (GB / 1000, "MB"),
+        _ => (GB, "GB"),
+    };
     format!("{}{name}", bytes.div_ceil(unit).max(1))
 }
 
