@@ -39,6 +39,11 @@ enum TemporaryPath {
 }
 
 impl TemporaryPath {
+    /// Whether it is a folder with content that is there.
+    fn is_tree(&self) -> bool {
+        matches!(self, Self::Tree(path) if path.exists())
+    }
+
     fn remove(&self) -> io::Result<()> {
         match self {
             Self::Tree(path) => fs::remove_dir_all(path),
@@ -67,16 +72,24 @@ pub fn catch(end: impl Fn() -> u8 + Send + 'static) {
 fn leave(end: &impl Fn() -> u8) -> ! {
     let _whole = whole();
     let passing = locked(&PASSING);
-    // Twice: a thread of the command may still write a file into a folder after it was removed.
-    for one in passing.iter().rev().chain(passing.iter().rev()) {
+    for one in passing.iter().rev() {
         // A compiler that was interrupted as well may still be writing or removing its last files.
-        let changes = || matches!(one, TemporaryPath::Tree(path) if path.exists());
         for _ in 0..100 {
-            if one.remove().is_ok() || !changes() {
+            if one.remove().is_ok() || !one.is_tree() {
                 break;
             }
             std::thread::sleep(Duration::from_millis(20));
         }
+    }
+    // A thread of the command may make a folder again that it was about to fill. It ends at the next file that it misses.
+    for _ in 0..100 {
+        std::thread::sleep(Duration::from_millis(20));
+        let back: Vec<_> = passing.iter().rev().filter(|one| one.is_tree()).collect();
+        if back.is_empty() {
+            break;
+        }
+        // Tried again in the next round.
+        back.into_iter().for_each(|one| drop(one.remove()));
     }
     std::process::exit(i32::from(end()));
 }

@@ -1,11 +1,11 @@
 //! Writes and plots records of reversal curves.
 
+use std::fs;
 use std::path::{Path, PathBuf};
 
 use host_sim::forc::ReversalRecord;
 use serde::Serialize;
 use specgen_language::arrays::Form;
-use specgen_language::files;
 use specgen_language::outcome::{Failure, Outcome};
 use specgen_language::output::{unwritten, write_file};
 
@@ -68,7 +68,7 @@ impl Curves {
         // The user did not name the further ones.
         for (text, path) in texts.iter().zip(paths.clone()).skip(1) {
             let head = |text: &str| text.lines().take(heads).map(str::to_owned).collect::<Vec<_>>();
-            let is_own = || files::text(&path).is_ok_and(|old| head(&old) == head(text));
+            let is_own = || fs::read_to_string(&path).is_ok_and(|old| head(&old) == head(text));
             // Arrays are not compared.
             let is_other = path.exists() && Form::of(&path).is_none() && !is_own();
             if is_other {
