@@ -120,6 +120,10 @@ fn further_records_replace_no_other_file() {
     assert!(run.code == 3 && run.stderr.contains("leg-fast.csv"), "{} {}", run.code, run.stderr);
     assert_eq!(folder.read("leg-fast.csv").lines().count(), 2);
     std::fs::remove_file(folder.path("leg-fast.csv")).unwrap();
+    folder.write("curves-fast.npz", "another's");
+    let run = folder.run(&["forc", "--two-rates", "--grid", "4", "-o", "curves.npz"]);
+    assert!(run.code == 3 && run.stderr.contains("curves-fast.npz"), "{} {}", run.code, run.stderr);
+    assert_eq!(folder.read("curves-fast.npz"), "another's");
     // Its own are replaced.
     for _ in 0..2 {
         assert_eq!(folder.run(&line).code, 0);

@@ -110,7 +110,8 @@ impl<'a> Table<'a> {
         let mut file = format!("{:116}", "MATLAB 5.0 MAT-file, written by specgen").into_bytes();
         file.extend([0; 8]);
         file.extend(b"\0\x01IM");
-        let mut names: Vec<String> = Vec::new();
+        // The text with the comments has a name of its own.
+        let mut names = vec![COMMENT.to_owned()];
         for (name, column) in &self.columns {
             let name = identifier(name, &names);
             let (class, size, kind, data) = match column {

@@ -69,8 +69,8 @@ impl Curves {
         for (text, path) in texts.iter().zip(paths.clone()).skip(1) {
             let head = |text: &str| text.lines().take(heads).map(str::to_owned).collect::<Vec<_>>();
             let is_own = || fs::read_to_string(&path).is_ok_and(|old| head(&old) == head(text));
-            // Arrays are not compared.
-            let is_other = path.exists() && Form::of(&path).is_none() && !is_own();
+            // Arrays are not compared: any that is there stays.
+            let is_other = path.exists() && (Form::of(&path).is_some() || !is_own());
             if is_other {
                 let why = "another file has that name; move it, or name another output";
                 return Err(unwritten(&path, &why));

@@ -43,7 +43,11 @@ fn array(file: &[u8], space: &mut Space) -> Result<Contents, String> {
     let fields = fields(value(&header, "descr")?)?;
     let in_columns = value(&header, "fortran_order")?.starts_with("True");
     let count = shape.iter().try_fold(1_usize, |count, length| count.checked_mul(*length)).ok_or(DAMAGED)?;
-    let width = fields.iter().try_fold(0_usize, |sum, field| sum.checked_add(field.form.1)).ok_or(DAMAGED)?;
+    let width = fields
+        .iter()
+        .try_fold(0_usize, |sum, field| sum.checked_add(field.form.1))
+        .filter(|width| *width > 0)
+        .ok_or(DAMAGED)?;
     let bytes = rest.take(count.checked_mul(width).ok_or(DAMAGED)?)?;
     if !rest.rest.is_empty() {
         return Err("it has more than one array, or its header is damaged".to_owned());
