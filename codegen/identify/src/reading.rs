@@ -55,7 +55,7 @@ pub fn size(text: &str) -> Result<u64, String> {
 pub(crate) fn shown_size(bytes: u64) -> String {
     let (unit, name) = match bytes {
         ..1_000_000 => (1000, "kB"),
-        ..=GB => (GB / 1000, "MB"),
+        1_000_000..=GB => (GB / 1000, "MB"),
         _ => (GB, "GB"),
     };
     format!("{}{name}", bytes.div_ceil(unit).max(1))
