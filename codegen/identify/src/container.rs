@@ -162,9 +162,8 @@ fn length_and_width(size: &[usize]) -> Option<[usize; 2]> {
     }
 }
 
-/// Puts arrays of equal length together: of the whole file if their names differ and only one group has times, otherwise
-/// of each group. Matrices
-/// without a vector beside them are a table each.
+/// Puts arrays of equal length together: of the whole file if their names differ and at most one group has times,
+/// otherwise of each group. Each matrix without a vector beside it is a table of its own.
 fn tables(contents: Contents) -> Tables {
     let mut left_out: Vec<String> = Vec::new();
     let mut of_length: BTreeMap<usize, Vec<Channels>> = BTreeMap::new();

@@ -55,8 +55,9 @@ impl Extent {
     }
 }
 
-/// The table that is read: `series`, a name or a number from 1, or else the longest; and the stretch of it. `is_known`: whether its
-/// names are those of a record. A note has the others, and what was left out. `None` after the problem was reported.
+/// The table that is read: `series`, a name or a number from 1, or else the longest; and the stretch of it. `is_known`:
+/// whether its names are those of a record. A note lists the others, and what was left out. `None` after the problem was
+/// reported.
 pub(crate) fn choose(
     all: &[Extent],
     is_known: impl Fn(&Extent) -> bool,
