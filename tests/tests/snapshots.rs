@@ -1,7 +1,7 @@
 //! Snapshots whose words were changed under a checksum that fits: what is loaded is a state that this machine can have, so that its ticks
 //! stay finite and within limits from there on.
 
-use crate::rate_options::{CREEP, DYNAMIC, rate_table};
+use crate::rate_options::{CREEP, DYNAMIC, WIDENED, option_files};
 use host_sim::controller::TickController as _;
 use host_sim::controller::{RestingReadings, SnapshotError, Supervised};
 use host_sim::word::Scalar;
@@ -87,7 +87,7 @@ fn changed(words: &mut [u64], draw: &mut ChaCha8Rng, scalar: Scalar) -> [usize; 
 }
 
 fn changed_snapshots_are_refused_or_harmless(name: &str, spec: &str, edits: &[(&str, &str)]) {
-    let emitted = Emitted::with_records(name, spec, edits, &[("mu1.csv", rate_table())]);
+    let emitted = Emitted::with_records(name, spec, edits, &option_files());
     let [low, high] = emitted.compiled.model.actuator.voltage;
     let mut course = Course::new(&emitted);
     let scalar = course.scalar;
@@ -187,6 +187,11 @@ fn of_a_platform_with_creep_in_f32() {
 #[test]
 fn of_a_platform_with_dynamic_preisach() {
     changed_snapshots_are_refused_or_harmless("snapshots-dynamic", "reference.toml", &[("memory  = 64", DYNAMIC)]);
+}
+
+#[test]
+fn of_a_platform_with_plays_that_widen() {
+    changed_snapshots_are_refused_or_harmless("snapshots-plays", "reference.toml", &[WIDENED]);
 }
 
 #[test]

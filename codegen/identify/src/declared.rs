@@ -61,6 +61,7 @@ pub fn records(model: &Model, dir: &Path) -> Result<SpecRecords, Vec<Diagnostic>
     if errors.is_empty() {
         let grid = all.grid(model.hysteresis.grid);
         all.tables.iter_mut().filter(|table| table.grid < grid).for_each(|table| *table = on_grid(table, grid));
+        all.take_plays_of_some();
         return Ok(all);
     }
     errors.extend(all.warnings);
@@ -121,6 +122,33 @@ impl SpecRecords {
         let period = model.timing.period;
         let share = worst.share(period);
         (share < INVERTED).then(|| not_invertible(model, share, worst.period()))
+    }
+
+    /// Takes the tables at rest in place of plays that not all legs have: a controller has one kind of memory.
+    fn take_plays_of_some(&mut self) {
+        let widens = |around: &Option<Around>| around.as_ref().is_some_and(|around| around.plays.is_some());
+        let with: Vec<&str> = self
+            .around
+            .iter()
+            .zip(&self.texts)
+            .filter(|(own, _)| widens(own))
+            .map(|(_, (name, _))| name.as_str())
+            .collect();
+        if with.is_empty() || with.len() == self.around.len() {
+            return;
+        }
+        let message =
+            format!("plays that widen with the rate in {} only: the table at rest is used there", with.join(", "));
+        let help = "identify those legs again with --model generalized-plays, or name one file for all six";
+        let place = Place::File { path: with[0].to_owned(), line: None };
+        self.warnings.push(Diagnostic::new(
+            codes::PLAYS_OF_SOME_LEGS,
+            "hysteresis.records",
+            place,
+            message,
+            help.to_owned(),
+        ));
+        self.around.iter_mut().flatten().for_each(|around| around.plays = None);
     }
 
     fn add_record(&mut self, model: &Model, name: &str, text: String) -> Result<(), Vec<Diagnostic>> {

@@ -25,10 +25,12 @@ use serde::{Deserialize, Serialize};
 use crate::everett::EverettTable;
 use crate::least_squares;
 use crate::regressor::{self, Plane};
+use crate::staircase::saturate;
 
 pub use families::{Choice, FamilyScore, Selection, choose};
 pub use family::Family;
 pub(crate) use family::TIMES;
+use family::WIDENED_PLAYS;
 pub use file::{read_leg_csv, write_leg_csv};
 
 /// Number of coefficients of a read-out: powers 1 to 5.
@@ -85,6 +87,67 @@ pub struct Around {
     pub rest_um: f64,
     /// Time constant (s) and weight of each creep operator.
     pub creep: Vec<[f64; 2]>,
+    /// Plays that widen with the rate, in place of the table; none if the rate does not show.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub plays: Option<WidenedPlays>,
+}
+
+/// Plays whose thresholds r_i are r_i (1 + κ ln(1 + |v|/v₀)), where v is the rate of the drive behind a low-pass filter.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct WidenedPlays {
+    /// κ > 0.
+    pub kappa: f64,
+    /// v₀, V/s.
+    #[serde(rename = "v0_V_per_s")]
+    pub v0: f64,
+    /// Time constant of the filter, s.
+    pub lag_s: f64,
+    /// r_i at rest, V, rising from 0.
+    #[serde(rename = "thresholds_V")]
+    pub thresholds: Vec<f64>,
+    /// Weights of the plays, µm/V.
+    #[serde(rename = "weights_um_per_V")]
+    pub weights: Vec<f64>,
+}
+
+impl WidenedPlays {
+    /// Their displacements (m above rest) at each `time` (s) and `drive` (V); the drive came slowly from `high` if `full`, else
+    /// from `low`.
+    fn displace(&self, displacement: &mut [f64], time: &[f64], drive: &[f64], [low, high]: [f64; 2], full: bool) {
+        let (Some(first), Some(begun)) = (drive.first(), time.first()) else { return };
+        let start = |r: &f64| saturate(if full { high - r } else { low + r }, [first - r, first + r]);
+        let mut states: Vec<f64> = self.thresholds.iter().map(start).collect();
+        let filter = fit::RateFilter { kappa: self.kappa, v0: self.v0, lag: self.lag_s };
+        let mut widening = fit::Widening { filter, rate: 0.0, time: *begun, drive: *first };
+        for ((y, t), u) in displacement.iter_mut().zip(time).zip(drive) {
+            widening.advance(&mut states, &self.thresholds, *t, *u);
+            let parts = states.iter().zip(&self.thresholds).zip(&self.weights);
+            *y = parts.fold(0.0, |sum, ((p, r), w)| sum + w * (p - low - r)) * 1e-6;
+        }
+    }
+
+    /// Their Everett table at rest: a play gains what a rise goes on after twice its threshold.
+    fn table(&self, plane: &Plane) -> EverettTable {
+        let Plane { grid, range: [drive_min, drive_max] } = *plane;
+        let cell = (drive_max - drive_min) / grid as f64;
+        let gained = |span: f64| {
+            let plays = self.thresholds.iter().zip(&self.weights).filter(|(r, _)| span > 2.0 * **r);
+            plays.fold(0.0, |sum, (r, w)| sum + w * (span - 2.0 * r)) * 1e-6
+        };
+        let spans = (1..=grid).flat_map(|up| (0..up).map(move |down| (up - down) as f64 * cell));
+        EverettTable { grid, drive_min, drive_max, nodes: spans.map(gained).collect() }
+    }
+
+    /// Whether a controller can use them.
+    fn is_valid(&self) -> bool {
+        let rises = |values: &[f64]| values.windows(2).all(|pair| pair[0] < pair[1]);
+        let numbers = self.kappa >= 0.0 && [self.v0, self.lag_s].iter().all(|value| *value > 0.0 && value.is_finite());
+        let pairs = self.thresholds.len() == WIDENED_PLAYS && self.weights.len() == WIDENED_PLAYS;
+        let weights =
+            self.weights.iter().all(|weight| *weight >= 0.0) && self.weights.first().is_some_and(|w| *w > 0.0);
+        numbers && pairs && weights && self.thresholds[0] == 0.0 && rises(&self.thresholds)
+    }
 }
 
 impl Around {
@@ -96,7 +159,7 @@ impl Around {
     pub fn of_table(table: &EverettTable) -> Self {
         let travel_um = table.node(table.grid, 0) * 1e6;
         let read_out = [1.0, 0.0, 0.0, 0.0, 0.0];
-        Self { read_out, travel_um, slope: 0.0, beta: 0.0, gamma: 0.0, rest_um: 0.0, creep: Vec::new() }
+        Self { read_out, travel_um, slope: 0.0, beta: 0.0, gamma: 0.0, rest_um: 0.0, creep: Vec::new(), plays: None }
     }
 
     /// Returns the parameters if a controller can use them.
@@ -110,6 +173,11 @@ impl Around {
         let bounded = plus > 0.0 && minus > -plus && self.rest_um.abs() * plus <= self.slope * (1.0 + 1e-6);
         let saturates = bounded || self.slope == 0.0 && self.rest_um == 0.0;
         let creeps = self.creep.iter().all(|[time, weight]| *time > 0.0 && (0.0..1.0).contains(weight));
+        if self.plays.as_ref().is_some_and(|plays| !plays.is_valid()) {
+            return Err(format!(
+                "{WIDENED_PLAYS} plays with rising thresholds from 0 and weights >= 0, the first > 0, are expected"
+            ));
+        }
         if !(positive && saturates && creeps) {
             return Err(format!(
                 "travel_um > 0, slope_um_per_V >= 0, beta + gamma > 0, beta > 0, rest_um at most slope_um_per_V / \
@@ -188,7 +256,17 @@ impl Around {
 
     /// Converts displacements of the table (m) at `drive` (V) to those of the leg before creep. The range of the drive is
     /// `low` to `high`; `full` means that the drive came from `high`, not from `low`.
-    pub(crate) fn complete(&self, displacement: &mut [f64], drive: &[f64], [low, high]: [f64; 2], full: bool) {
+    pub(crate) fn complete(
+        &self,
+        displacement: &mut [f64],
+        time: &[f64],
+        drive: &[f64],
+        [low, high]: [f64; 2],
+        full: bool,
+    ) {
+        if let Some(plays) = &self.plays {
+            plays.displace(displacement, time, drive, [low, high], full);
+        }
         let start = if full { self.state_after(self.rest_um, high - low) } else { self.rest_um };
         let (mut z, mut before) = (start, if full { high } else { low });
         let inverse = self.inverse().unwrap_or_default().0;

@@ -16,6 +16,7 @@ pub use permitted::*;
 use scalar::Numbers;
 use specgen_runtime::bouc_wen::READ_OUT;
 use specgen_runtime::dynamics::Leg;
+use specgen_runtime::plays::PLAYS;
 use specgen_runtime::{Creep, Platform, Real};
 pub use specgen_runtime::{Interaction, Law, SetpointKind};
 pub use supervision::{Rest, Supervision, Wiring};
@@ -257,6 +258,14 @@ pub struct Hysteresis {
     pub lead: Option<Lead>,
 }
 
+impl Hysteresis {
+    /// Whether the legs have plays in place of the tables.
+    #[must_use]
+    pub fn has_plays(&self) -> bool {
+        matches!(self.rate, Some(RateModel::BoucWen { plays: Some(_), .. }))
+    }
+}
+
 /// Rate dependence of the leg model, at the period of the spec.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
@@ -285,7 +294,55 @@ pub enum RateModel {
     BoucWen {
         /// Of each leg; all have the same number of creep operators.
         legs: Box<[BoucWen; LEGS]>,
+        /// Plays that widen with the rate, in place of the tables.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        plays: Option<Box<[Plays; LEGS]>>,
     },
+}
+
+/// The constants of [`specgen_runtime::Plays`], where each is explained.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Plays {
+    /// N, cells.
+    pub full_scale: f64,
+    /// r_i, cells.
+    pub thresholds: Vec<f64>,
+    /// w_i, m per cell.
+    pub weights: Vec<f64>,
+    /// Σ w_i.
+    pub slope: f64,
+    /// Σ w_i r_i.
+    pub rest: f64,
+    /// κ.
+    pub widening: f64,
+    /// 1/v₀, ticks per cell.
+    pub per_rate: f64,
+    /// e^(−T/τ).
+    pub decay: f64,
+}
+
+impl Plays {
+    /// Every number, in the order of the runtime's checksum.
+    #[must_use]
+    pub fn numbers(&self) -> Vec<f64> {
+        let after = [self.slope, self.rest, self.widening, self.per_rate, self.decay];
+        [&[self.full_scale][..], &self.thresholds, &self.weights, &after].concat()
+    }
+
+    /// The runtime's type; none if there is another number of plays.
+    pub fn constants<T: Real>(&self, numbers: &impl Numbers<T>) -> Option<specgen_runtime::Plays<T>> {
+        let list = |values: &Vec<f64>| values.as_array().map(|values| numbers.vector::<PLAYS>(values));
+        Some(specgen_runtime::Plays {
+            full_scale: numbers.real(self.full_scale),
+            thresholds: list(&self.thresholds)?,
+            weights: list(&self.weights)?,
+            slope: numbers.real(self.slope),
+            rest: numbers.real(self.rest),
+            widening: numbers.real(self.widening),
+            per_rate: numbers.real(self.per_rate),
+            decay: numbers.real(self.decay),
+        })
+    }
 }
 
 /// The constants of [`specgen_runtime::BoucWen`], where each is explained.

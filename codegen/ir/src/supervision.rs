@@ -54,6 +54,9 @@ pub struct Rest {
     /// With a Bouc-Wen state: the table's part of the displacement, and z, of each leg, m.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub bouc_wen: Option<[[f64; 2]; LEGS]>,
+    /// With plays that widen: p_i − u of each leg, cells.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub plays: Option<Box<[Vec<f64>; LEGS]>>,
 }
 
 impl Deref for Supervision {

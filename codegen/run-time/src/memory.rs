@@ -6,10 +6,11 @@ use std::fmt::Debug;
 use specgen_ir::scalar::{Numbers as _, kept};
 use specgen_ir::{self as ir, Hysteresis, Ir, LEGS, RateModel, Rest};
 use specgen_law::LegMemory;
+use specgen_runtime::plays::PLAYS;
 use specgen_runtime::snapshot::{Field, InvalidState, Reader, WordSink};
 use specgen_runtime::{
     BoucWenEverett, BoucWenMemory, Creep, CreepEverett, CreepMemory, DynamicEverett, DynamicMemory, LastLine, Nodes,
-    Real, ReversalMemory, Snapshot,
+    PlayMemory, Plays, Real, ReversalMemory, Snapshot, WidenedMemory,
 };
 
 use crate::InvalidIr;
@@ -20,7 +21,7 @@ pub const ROOM: usize = 256;
 
 /// A static model, a rate-dependent one, or one with a number of creep operators, with or without a Bouc-Wen state.
 macro_rules! models {
-    ($($creep:ident $count:literal),+; $($bouc_wen:ident $terms:literal),+) => {
+    ($($creep:ident $count:literal),+; $($bouc_wen:ident $plays:ident $terms:literal),+) => {
         /// Table of a leg.
         #[derive(Debug, Clone, Copy)]
         pub enum Table<T: Real> {
@@ -28,6 +29,7 @@ macro_rules! models {
             Dynamic(DynamicEverett<T, Nodes<'static, T>>),
             $($creep(CreepEverett<'static, T, Nodes<'static, T>, $count>),)+
             $($bouc_wen(BoucWenEverett<'static, T, Nodes<'static, T>, $terms>),)+
+            $($plays(BoucWenEverett<'static, T, &'static Plays<T>, $terms>),)+
         }
 
         /// Memory of a leg's drive.
@@ -37,6 +39,7 @@ macro_rules! models {
             Dynamic(DynamicMemory<T, ROOM>),
             $($creep(CreepMemory<T, ROOM, $count>),)+
             $($bouc_wen(BoucWenMemory<T, ROOM, $terms>),)+
+            $($plays(WidenedMemory<T, $terms>),)+
         }
 
         impl<T: Real> Field for Memory<T> {
@@ -52,6 +55,7 @@ macro_rules! models {
                     Memory::Dynamic($name) => $value,
                     $(Memory::$creep($name) => $value,)+
                     $(Memory::$bouc_wen($name) => $value,)+
+                    $(Memory::$plays($name) => $value,)+
                 }
             };
         }
@@ -64,6 +68,7 @@ macro_rules! models {
                     (Memory::Dynamic($name), Table::Dynamic($table)) => $value,
                     $((Memory::$creep($name), Table::$creep($table)) => $value,)+
                     $((Memory::$bouc_wen($name), Table::$bouc_wen($table)) => $value,)+
+                    $((Memory::$plays($name), Table::$plays($table)) => $value,)+
                     _ => unreachable!("a memory and a table of one spec"),
                 }
             };
@@ -95,15 +100,27 @@ macro_rules! models {
             convert: &Convert<T>,
             tables: &[Nodes<'static, T>; LEGS],
             legs: &[ir::BoucWen; LEGS],
+            plays: Option<&[ir::Plays; LEGS]>,
         ) -> Result<LegModels<T>, InvalidIr> {
             $(
                 let around: Option<Vec<_>> = legs.iter().map(|leg| leg.constants::<T, $terms>(convert)).collect();
                 if let Some(around) = around {
                     let around: &'static [specgen_runtime::BoucWen<T, $terms>] = kept(around);
+                    if let Some(plays) = plays {
+                        let plays: Option<Vec<_>> = plays.iter().map(|leg| leg.constants(convert)).collect();
+                        let wrong = InvalidIr::Part("the number of plays");
+                        let plays: &'static [Plays<T>] = kept(plays.ok_or(wrong)?);
+                        let table = |leg: usize| {
+                            Table::$plays(BoucWenEverett { still: &plays[leg], around: &around[leg] })
+                        };
+                        let memory =
+                            |leg: usize| Memory::$plays(WidenedMemory::at_rest(&plays[leg], around[leg].rest));
+                        return Ok((std::array::from_fn(table), std::array::from_fn(memory)));
+                    }
                     let tables = std::array::from_fn(|leg| {
                         Table::$bouc_wen(BoucWenEverett { still: tables[leg], around: &around[leg] })
                     });
-                    let memory = |leg: usize| Memory::$bouc_wen(BoucWenMemory::new(around[leg].rest));
+                    let memory = |leg: usize| Memory::$bouc_wen(BoucWenMemory::at_rest(around[leg].rest));
                     return Ok((tables, std::array::from_fn(memory)));
                 }
             )+
@@ -111,13 +128,25 @@ macro_rules! models {
         }
 
         impl<T: Real> Memory<T> {
-            /// Risen from negative saturation to `drive`; with a Bouc-Wen state, the table's part and z there.
-            pub fn risen(self, drive: T, displacement: T, rate: T, [still, z]: [T; 2]) -> Self {
+            /// Risen from negative saturation to `drive`; with a Bouc-Wen state, the table's part and z there; with plays, their
+            /// states.
+            pub fn risen(
+                self,
+                drive: T,
+                displacement: T,
+                rate: T,
+                [still, z]: [T; 2],
+                plays: Option<[T; PLAYS]>,
+            ) -> Self {
                 match self {
                     Self::Static(_) => Self::Static(ReversalMemory::risen(drive, displacement)),
                     Self::Dynamic(_) => Self::Dynamic(DynamicMemory::risen(drive, displacement, rate)),
                     $(Self::$creep(_) => Self::$creep(CreepMemory::risen(drive, displacement)),)+
                     $(Self::$bouc_wen(_) => Self::$bouc_wen(BoucWenMemory::risen(drive, still, z, displacement)),)+
+                    $(Self::$plays(_) => {
+                        let Some(states) = plays else { unreachable!("a rest of one spec") };
+                        Self::$plays(WidenedMemory::risen(PlayMemory::risen(drive, still, states), z, displacement))
+                    })+
                 }
             }
         }
@@ -125,7 +154,8 @@ macro_rules! models {
 }
 models!(
     Creep1 1, Creep2 2, Creep3 3, Creep4 4, Creep5 5, Creep6 6;
-    BoucWen0 0, BoucWen1 1, BoucWen2 2, BoucWen3 3, BoucWen4 4, BoucWen5 5, BoucWen6 6
+    BoucWen0 Plays0 0, BoucWen1 Plays1 1, BoucWen2 Plays2 2, BoucWen3 Plays3 3, BoucWen4 Plays4 4, BoucWen5 Plays5 5,
+    BoucWen6 Plays6 6
 );
 
 /// Converts a slice of exactly its length to an array.
@@ -207,7 +237,7 @@ pub fn models<T: Real>(convert: &Convert<T>, h: &Hysteresis) -> Result<LegModels
         Some(RateModel::Creep { gains, weights, carried, direct }) => {
             with_creep(convert, &tables, [gains, weights, carried], *direct)?
         }
-        Some(RateModel::BoucWen { legs }) => with_bouc_wen(convert, &tables, legs)?,
+        Some(RateModel::BoucWen { legs, plays }) => with_bouc_wen(convert, &tables, legs, plays.as_deref())?,
     })
 }
 
@@ -217,7 +247,8 @@ pub fn at_rest<T: Real>(fresh: [Memory<T>; LEGS], convert: &Convert<T>, rest: &R
     let displacement = convert.vector(&rest.displacement);
     let rate = convert.vector(&rest.rate);
     let parts = convert.matrix(&rest.bouc_wen.unwrap_or_default());
-    std::array::from_fn(|leg| fresh[leg].risen(drive, displacement[leg], rate[leg], parts[leg]))
+    let plays = |leg: usize| Some(convert.vector(rest.plays.as_ref()?[leg].as_array()?));
+    std::array::from_fn(|leg| fresh[leg].risen(drive, displacement[leg], rate[leg], parts[leg], plays(leg)))
 }
 
 /// The leg models of a spec on their own, from power-up on. Their tables stay in memory to the end of the process.

@@ -3,8 +3,8 @@
 use core::fmt::Debug;
 
 use specgen_runtime::{
-    BoucWenEverett, BoucWenMemory, CreepEverett, CreepMemory, DynamicEverett, DynamicMemory, Grid, LastLine, Real,
-    ReversalMemory, Snapshot,
+    BoucWenEverett, CreepEverett, CreepMemory, DynamicEverett, DynamicMemory, Grid, HysteresisMemory, LastLine,
+    LegModelMemory, Real, ReversalMemory, Snapshot,
 };
 
 /// Memory of a leg's drive; forward model and inverse over a table.
@@ -93,8 +93,8 @@ leg_memory! {
             self.fell_back()
         }
     }
-    ['a, T: Real + Debug, G: Grid<T>, const CAP: usize, const K: usize]
-        BoucWenEverett<'a, T, G, K>, BoucWenMemory<T, CAP, K>
+    ['a, T: Real + Debug, G, M: HysteresisMemory<T, G> + Debug, const K: usize]
+        BoucWenEverett<'a, T, G, K>, LegModelMemory<T, M, K>
     {
         #[inline(always)]
         fn track(

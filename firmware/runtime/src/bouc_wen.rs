@@ -55,8 +55,9 @@
 
 use crate::crc::Crc32;
 use crate::creep::Creep;
-use crate::everett::{Grid, LastLine};
-use crate::memory::ReversalMemory;
+use crate::everett::LastLine;
+use crate::memory::{DriveMemory, HysteresisMemory, ReversalMemory};
+use crate::plays::{PlayMemory, Plays};
 use crate::real::{Real, saturate};
 use crate::snapshot::LARGEST;
 
@@ -117,10 +118,10 @@ pub struct BoucWenEverett<'a, T, G, const K: usize> {
 }
 
 crate::state! { |words|
-    /// Reversal memory, Bouc-Wen state and creep states of one leg. Reset: at rest, drive 0 after negative saturation
-    /// with z = `rest`, no creep left.
-    pub struct BoucWenMemory<T, CAP, K>[T: Real, const CAP: usize, const K: usize](rest: T) {
-        memory: ReversalMemory<T, CAP> = ReversalMemory::new(), part;
+    /// Memory of Γ, Bouc-Wen state and creep states of one leg. Reset: at rest, drive 0 after negative saturation with z =
+    /// `rest`, no creep left.
+    pub struct LegModelMemory<T, M, K>[T: Real, M: DriveMemory<T>, const K: usize](memory: M, rest: T) {
+        memory: M = memory, part;
         /// z: the Bouc-Wen state, m.
         z: T = rest, number(words.sizes().leg);
         /// Last step of the drive, cells.
@@ -132,22 +133,67 @@ crate::state! { |words|
     }
 }
 
+/// That of a leg whose Γ is a table.
+pub type BoucWenMemory<T, const CAP: usize, const K: usize> = LegModelMemory<T, ReversalMemory<T, CAP>, K>;
+
 impl<T: Real, const CAP: usize, const K: usize> BoucWenMemory<T, CAP, K> {
+    /// At rest, with z = `rest`, m.
+    #[must_use]
+    pub const fn at_rest(rest: T) -> Self {
+        Self::new(ReversalMemory::new(), rest)
+    }
+
     /// The state at a drive just reached from below, see [`ReversalMemory::risen`]. `still` is the displacement of the
     /// table, `displacement` that of the leg without creep; all in m.
     #[must_use]
     pub const fn risen(drive: T, still: T, z: T, displacement: T) -> Self {
-        let mut memory = Self::new(z);
-        memory.memory = ReversalMemory::risen(drive, still);
+        let mut memory = Self::new(ReversalMemory::risen(drive, still), z);
         memory.displacement = displacement;
         memory
     }
+}
 
-    crate::memory::present_point!();
+/// That of a leg whose Γ is plays that widen with the rate.
+pub type WidenedMemory<T, const K: usize> = LegModelMemory<T, PlayMemory<T>, K>;
+
+impl<T: Real, const K: usize> WidenedMemory<T, K> {
+    /// At rest, with z = `rest`, m.
+    #[must_use]
+    pub const fn at_rest(plays: &Plays<T>, rest: T) -> Self {
+        Self::new(PlayMemory::new(plays.thresholds), rest)
+    }
+
+    /// The state at a drive just reached from below, see [`PlayMemory::risen`], with z and the `displacement` of the leg
+    /// without creep, m.
+    #[must_use]
+    pub const fn risen(plays: PlayMemory<T>, z: T, displacement: T) -> Self {
+        let mut memory = Self::new(plays, z);
+        memory.displacement = displacement;
+        memory
+    }
+}
+
+impl<T: Real, M: DriveMemory<T>, const K: usize> LegModelMemory<T, M, K> {
+    /// The drive last applied, cells.
+    #[inline]
+    #[must_use]
+    pub fn drive(&self) -> T {
+        self.memory.drive()
+    }
+
+    /// The displacement that the model gives at the end of the tick over which the last drive is held, m.
+    #[inline]
+    #[must_use]
+    pub fn displacement(&self) -> T {
+        self.displacement
+    }
 
     /// One tick with `drive` (cells, finite, held within 0..=N); returns the displacement at its end, m.
     #[inline]
-    pub fn apply<G: Grid<T>>(&mut self, table: &BoucWenEverett<'_, T, G, K>, drive: T) -> T {
+    pub fn apply<G>(&mut self, table: &BoucWenEverett<'_, T, G, K>, drive: T) -> T
+    where
+        M: HysteresisMemory<T, G>,
+    {
         let before = self.memory.drive();
         self.memory.apply(&table.still, drive);
         self.advance(table, before);
@@ -157,26 +203,35 @@ impl<T: Real, const CAP: usize, const K: usize> BoucWenMemory<T, CAP, K> {
     /// The drive (cells) with which the next tick ends at `displacement` (m, finite), as near as the table reaches.
     #[inline]
     #[must_use]
-    pub fn solve<G: Grid<T>>(&self, table: &BoucWenEverett<'_, T, G, K>, displacement: T) -> T {
+    pub fn solve<G>(&self, table: &BoucWenEverett<'_, T, G, K>, displacement: T) -> T
+    where
+        M: HysteresisMemory<T, G>,
+    {
         self.memory.solve(&table.still, self.static_demand(table, displacement).0)
     }
 
     /// Whether the table reaches `displacement` (m) from the present state.
     #[inline]
     #[must_use]
-    pub fn reaches<G: Grid<T>>(&self, table: &BoucWenEverett<'_, T, G, K>, displacement: T) -> bool {
+    pub fn reaches<G>(&self, table: &BoucWenEverett<'_, T, G, K>, displacement: T) -> bool
+    where
+        M: HysteresisMemory<T, G>,
+    {
         let (still, within) = self.static_demand(table, displacement);
         within && self.memory.reaches(&table.still, still)
     }
 
     /// As [`ReversalMemory::follow_within`].
     #[inline(always)]
-    pub fn follow_within<G: Grid<T>>(
+    pub fn follow_within<G>(
         &mut self,
         table: &BoucWenEverett<'_, T, G, K>,
         displacement: T,
         permit: impl FnOnce(T) -> T,
-    ) -> bool {
+    ) -> bool
+    where
+        M: HysteresisMemory<T, G>,
+    {
         let before = self.memory.drive();
         let (still, within) = self.static_demand(table, displacement);
         let beyond = self.memory.follow_within(&table.still, still, permit);
@@ -186,13 +241,16 @@ impl<T: Real, const CAP: usize, const K: usize> BoucWenMemory<T, CAP, K> {
 
     /// As [`ReversalMemory::track`].
     #[inline(always)]
-    pub fn track<G: Grid<T>>(
+    pub fn track<G>(
         &mut self,
         table: &BoucWenEverett<'_, T, G, K>,
         last: &mut LastLine<T>,
         displacement: T,
         permit: impl FnOnce(T) -> Option<T>,
-    ) -> bool {
+    ) -> bool
+    where
+        M: HysteresisMemory<T, G>,
+    {
         let before = self.memory.drive();
         let (still, within) = self.static_demand(table, displacement);
         let tracked = within && self.memory.track(&table.still, last, still, permit);
@@ -205,7 +263,7 @@ impl<T: Real, const CAP: usize, const K: usize> BoucWenMemory<T, CAP, K> {
     /// Output of Γ that gives `displacement` at the end of the next tick, m, not limited to the table; and whether it
     /// is within the range of the read-out.
     #[inline(always)]
-    fn static_demand<G: Grid<T>>(&self, table: &BoucWenEverett<'_, T, G, K>, displacement: T) -> (T, bool) {
+    fn static_demand<G>(&self, table: &BoucWenEverett<'_, T, G, K>, displacement: T) -> (T, bool) {
         let around = table.around;
         let demand = around.creep.without_carried(&self.states, displacement) * around.share;
         let h = saturate(demand, around.travel[0], around.travel[1]);
@@ -215,7 +273,7 @@ impl<T: Real, const CAP: usize, const K: usize> BoucWenMemory<T, CAP, K> {
 
     /// Updates z, creep and displacement after a step of the drive from `before` to the present one.
     #[inline(always)]
-    fn advance<G: Grid<T>>(&mut self, table: &BoucWenEverett<'_, T, G, K>, before: T) {
+    fn advance<G>(&mut self, table: &BoucWenEverett<'_, T, G, K>, before: T) {
         let around = table.around;
         self.step = self.memory.drive() - before;
         let middle = self.z + T::HALF * self.step * around.rate(self.z, self.step);

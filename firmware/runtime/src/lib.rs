@@ -13,6 +13,7 @@
 //! | [`dynamic`] | rate-dependent model and inverse: a second weight times the rate of the drive | section 3, (6) |
 //! | [`creep`] | rate dependence as creep behind the static model, and its inverse | |
 //! | [`bouc_wen`] | a Bouc-Wen state beside the table, a read-out and creep, and their inverse | |
+//! | [`plays`] | plays that widen with the rate, in place of the table | |
 //! | [`adaptation`] | run-to-run EWMA and PCC | (AII.3), (AII.5), (AII.6) |
 //! | [`mode`] | P, F, P/F; where the interaction force comes from | section 4 |
 //! | [`feedback`] | position feedback with anti-windup | (7) |
@@ -72,6 +73,7 @@ pub mod pass;
 pub mod pending;
 pub mod permitted;
 pub mod playback;
+pub mod plays;
 pub mod real;
 pub mod record;
 pub mod recorder;
@@ -87,7 +89,7 @@ pub mod wave;
 
 pub use adaptation::{Estimate, Law};
 pub use attitude::{Attitude, Series};
-pub use bouc_wen::{BoucWen, BoucWenEverett, BoucWenMemory};
+pub use bouc_wen::{BoucWen, BoucWenEverett, BoucWenMemory, LegModelMemory, WidenedMemory};
 pub use correction::{Correction, CorrectionLimit, RequestCorrection};
 pub use crc::Crc32;
 pub use creep::{Creep, CreepEverett, CreepMemory};
@@ -99,11 +101,12 @@ pub use dynamics::{Affine, Load, Platform};
 pub use everett::{Everett, Grid, LastLine, Nodes};
 pub use feedback::{Gains, Integral};
 pub use kinematics::Legs;
-pub use memory::ReversalMemory;
+pub use memory::{DriveMemory, HysteresisMemory, ReversalMemory};
 pub use mode::{ControlMode, Interaction, SetpointKind};
 pub use motion::Motion;
 pub use notch::{Notch, NotchState, Section};
 pub use permitted::PermittedRange;
+pub use plays::{PlayMemory, Plays};
 pub use real::Real;
 pub use recorder::Recorder;
 pub use sensing::{Calibration, GaugeCalibration, GaugeConverter, Gauges};

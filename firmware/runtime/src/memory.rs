@@ -35,7 +35,7 @@
 
 use crate::everett::{Grid, LastLine, Line};
 use crate::real::{Real, saturate};
-use crate::snapshot::LARGEST;
+use crate::snapshot::{LARGEST, Snapshot};
 
 crate::state! { |words|
     /// Staircase of at most `CAP` ≥ 4 extrema. Drives in cells of the Everett grid, displacements in m.
@@ -111,6 +111,74 @@ macro_rules! present_point {
     };
 }
 pub(crate) use present_point;
+
+/// Memory of a leg's drive.
+pub trait DriveMemory<T: Real>: Snapshot + Copy {
+    /// The drive last applied, cells.
+    fn drive(&self) -> T;
+    /// The displacement that the model gives for it, m.
+    fn displacement(&self) -> T;
+}
+
+/// Forward model and inverse of a leg with the parameters in a `Table`: methods as those of [`ReversalMemory`].
+pub trait HysteresisMemory<T: Real, Table>: DriveMemory<T> {
+    /// As [`ReversalMemory::apply`].
+    fn apply(&mut self, table: &Table, drive: T) -> T;
+    /// As [`ReversalMemory::solve`].
+    fn solve(&self, table: &Table, displacement: T) -> T;
+    /// As [`ReversalMemory::reaches`].
+    fn reaches(&self, table: &Table, displacement: T) -> bool;
+    /// As [`ReversalMemory::follow_within`].
+    fn follow_within(&mut self, table: &Table, displacement: T, permit: impl FnOnce(T) -> T) -> bool;
+    /// As [`ReversalMemory::track`]; false if there is no faster path.
+    fn track(
+        &mut self,
+        table: &Table,
+        last: &mut LastLine<T>,
+        displacement: T,
+        permit: impl FnOnce(T) -> Option<T>,
+    ) -> bool;
+}
+
+impl<T: Real, const CAP: usize> DriveMemory<T> for ReversalMemory<T, CAP> {
+    #[inline(always)]
+    fn drive(&self) -> T {
+        self.drive
+    }
+    #[inline(always)]
+    fn displacement(&self) -> T {
+        self.displacement
+    }
+}
+
+impl<T: Real, G: Grid<T>, const CAP: usize> HysteresisMemory<T, G> for ReversalMemory<T, CAP> {
+    #[inline(always)]
+    fn apply(&mut self, table: &G, drive: T) -> T {
+        self.apply(table, drive)
+    }
+    #[inline(always)]
+    fn solve(&self, table: &G, displacement: T) -> T {
+        self.solve(table, displacement)
+    }
+    #[inline(always)]
+    fn reaches(&self, table: &G, displacement: T) -> bool {
+        self.reaches(table, displacement)
+    }
+    #[inline(always)]
+    fn follow_within(&mut self, table: &G, displacement: T, permit: impl FnOnce(T) -> T) -> bool {
+        self.follow_within(table, displacement, permit)
+    }
+    #[inline(always)]
+    fn track(
+        &mut self,
+        table: &G,
+        last: &mut LastLine<T>,
+        displacement: T,
+        permit: impl FnOnce(T) -> Option<T>,
+    ) -> bool {
+        self.track(table, last, displacement, permit)
+    }
+}
 
 impl<T: Real, const CAP: usize> ReversalMemory<T, CAP> {
     /// Evaluated by `new`, so that a smaller `CAP` does not compile.

@@ -6,7 +6,7 @@ mod random;
 
 use std::io::Cursor;
 
-use crate::rate_options::{CREEP, DYNAMIC, rate_table};
+use crate::rate_options::{CREEP, DYNAMIC, WIDENED, option_files};
 use host_sim::controller::{Controller, RestingReadings, Supervised, TickController as _};
 use host_sim::record::{Reader, Writer, replay};
 use host_sim::trace::first_difference;
@@ -325,7 +325,7 @@ fn alike_in_all(name: &str, emitted: &Emitted, ticks: usize) -> Phases {
 }
 
 fn alike(name: &str, spec: &str, edits: &[(&str, &str)]) {
-    let emitted = Emitted::with_records(&format!("run-time-{name}"), spec, edits, &[("mu1.csv", rate_table())]);
+    let emitted = Emitted::with_records(&format!("run-time-{name}"), spec, edits, &option_files());
     let phases = alike_in_all(name, &emitted, ticks());
     assert!(phases[2] > 0, "{name}: {phases:?}");
 }
@@ -357,6 +357,13 @@ fn a_platform_with_a_leg_model_of_every_part_has_the_bits_of_the_emitted_one() {
 fn six_legs_with_a_leg_model_in_single_precision_have_the_bits_of_the_emitted_ones() {
     let edits = [LEG_MODEL, ("scalar   = \"f64\"", "scalar   = \"f32\"")];
     alike("leg-model-f32", "legs.toml", &edits);
+}
+
+#[test]
+#[ignore = "long: a controller of six legs and one of a platform; its image has the bits of the run-time law in the short run"]
+fn plays_that_widen_have_the_bits_of_the_emitted_ones() {
+    alike("plays", "reference.toml", &[WIDENED]);
+    alike("plays-f32", "legs.toml", &[WIDENED, ("scalar   = \"f64\"", "scalar   = \"f32\"")]);
 }
 
 #[test]

@@ -15,11 +15,21 @@ pub fn emit(ir: &Ir) -> TokenStream {
     let tables = tables(ir);
     let creep = match ir.hysteresis.rate {
         Some(RateModel::Creep { .. }) => Some(quote! { black_box(&hysteresis::CREEP_OF_LEGS).checksum(crc); }),
-        Some(RateModel::BoucWen { .. }) => Some(quote! {
-            for around in black_box(&hysteresis::AROUND_OF_LEGS) {
-                around.checksum(crc);
-            }
-        }),
+        Some(RateModel::BoucWen { ref plays, .. }) => {
+            let plays = plays.as_ref().map(|_| {
+                quote! {
+                    for plays in black_box(&hysteresis::PLAYS_OF_LEGS) {
+                        plays.checksum(crc);
+                    }
+                }
+            });
+            Some(quote! {
+                for around in black_box(&hysteresis::AROUND_OF_LEGS) {
+                    around.checksum(crc);
+                }
+                #plays
+            })
+        }
         _ => None,
     };
     let (setpoint, trajectories) = match ir.task_space {
@@ -77,6 +87,7 @@ fn tables(ir: &Ir) -> Vec<Ident> {
         Some(RateModel::DynamicPreisach { tables, .. }) => tables.len(),
         _ => 0,
     };
-    let names = (0..h.tables.len()).map(|k| format_ident!("EVERETT_{k}"));
+    let still = if h.has_plays() { 0 } else { h.tables.len() };
+    let names = (0..still).map(|k| format_ident!("EVERETT_{k}"));
     names.chain((0..of_rate).map(|k| format_ident!("RATE_{k}"))).collect()
 }

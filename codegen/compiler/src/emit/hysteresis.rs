@@ -1,18 +1,21 @@
 //! `src/hysteresis.rs`: the Everett tables. Reads [`ir::Hysteresis`](crate::ir::Hysteresis); exports `TABLES` and the types
 //! of table and memory: of the static model, or of one with rate dependence or creep. All three have the same interface.
 
-use proc_macro2::{Ident, TokenStream};
+use proc_macro2::{Ident, Literal, TokenStream};
 use quote::{format_ident, quote};
 
 use super::literal;
-use crate::ir::{Ir, LEGS, RateModel, Scalar};
+use crate::ir::{Ir, LEGS, Plays, RateModel, Scalar};
 
 pub fn emit(ir: &Ir) -> TokenStream {
     let h = &ir.hysteresis;
     let (grid, memory) = (literal::count(h.grid), literal::count(h.memory));
     let doc = "Everett function of leg {}, m: E(i, j) for `up` threshold i = 0..=N and, in each row, `down` threshold j = 0..=i; from `hysteresis.records`.";
-    let (tables, of_leg) = statics(ir.scalar, &h.tables, &h.table_of_leg, "EVERETT", doc);
+    let (mut tables, of_leg) = statics(ir.scalar, &h.tables, &h.table_of_leg, "EVERETT", doc);
     let Rate { imports, types: [table, memory_type], entries, constants } = rate(ir, &of_leg);
+    if h.has_plays() {
+        tables.clear();
+    }
     let rate_doc = rate_doc(ir);
     // A platform applies its lead to the load, see `task_space.rs`.
     let lead = ir.task_space.is_none().then(|| {
@@ -107,7 +110,7 @@ fn rate(ir: &Ir, of_leg: &[Ident]) -> Rate {
                 },
             }
         }
-        Some(RateModel::BoucWen { legs }) => {
+        Some(RateModel::BoucWen { legs, plays }) => {
             let creep = literal::count(legs[0].gains.len());
             let entries = of_leg.iter().enumerate().map(|(leg, table)| {
                 let leg = literal::count(leg);
@@ -135,6 +138,9 @@ fn rate(ir: &Ir, of_leg: &[Ident]) -> Rate {
                     }
                 }
             });
+            if let Some(plays) = plays {
+                return widened(ir.scalar, plays.as_ref(), &creep, around.collect());
+            }
             Rate {
                 imports: quote! { {BoucWen, BoucWenEverett, BoucWenMemory, Creep, Everett} },
                 types: [
@@ -178,6 +184,48 @@ fn rate(ir: &Ir, of_leg: &[Ident]) -> Rate {
     }
 }
 
+/// Legs with plays in place of their tables.
+fn widened(scalar: Scalar, plays: &[Plays; LEGS], creep: &Literal, around: Vec<TokenStream>) -> Rate {
+    let entries = (0..LEGS).map(|leg| {
+        let leg = literal::count(leg);
+        quote! { BoucWenEverett { still: &PLAYS_OF_LEGS[#leg], around: &AROUND_OF_LEGS[#leg] } }
+    });
+    let plays = plays.iter().map(|leg| {
+        let [thresholds, weights] = [&leg.thresholds, &leg.weights].map(|values| literal::reals(scalar, values));
+        let [full_scale, slope, rest, widening, per_rate, decay] =
+            [leg.full_scale, leg.slope, leg.rest, leg.widening, leg.per_rate, leg.decay]
+                .map(|value| literal::real(scalar, value));
+        quote! {
+            Plays {
+                full_scale: #full_scale,
+                thresholds: [#thresholds],
+                weights: [#weights],
+                slope: #slope,
+                rest: #rest,
+                widening: #widening,
+                per_rate: #per_rate,
+                decay: #decay,
+            }
+        }
+    });
+    Rate {
+        imports: quote! { {BoucWen, BoucWenEverett, Creep, Plays, WidenedMemory} },
+        types: [
+            quote! { BoucWenEverett<'static, Real, &'static Plays<Real>, CREEP> },
+            quote! { WidenedMemory<Real, CREEP> },
+        ],
+        entries: entries.collect(),
+        constants: quote! {
+            /// Creep operators.
+            pub const CREEP: usize = #creep;
+            /// What is around the plays of each leg, over a tick of `timing.period`; from `hysteresis.records`.
+            pub(crate) static AROUND_OF_LEGS: [BoucWen<Real, CREEP>; LEGS] = [#(#around),*];
+            /// Plays of each leg, which widen with the rate; from `hysteresis.records`.
+            pub(crate) static PLAYS_OF_LEGS: [Plays<Real>; LEGS] = [#(#plays),*];
+        },
+    }
+}
+
 /// A `static` for each distinct table, and the name of each leg's.
 fn statics(
     scalar: Scalar,
@@ -214,6 +262,9 @@ fn rate_doc(ir: &Ir) -> Vec<&'static str> {
         ]),
         Some(RateModel::BoucWen { .. }) => {
             lines.push(" Γ is a table with a Bouc-Wen state, a read-out and creep; see `specgen_runtime::bouc_wen`.");
+            if ir.hysteresis.has_plays() {
+                lines.push(" Plays that widen with the rate are in place of the table; see `specgen_runtime::plays`.");
+            }
         }
         Some(RateModel::Creep { .. }) => {
             lines.push(" Γ is the static model followed by creep; see `specgen_runtime::creep`.");

@@ -40,11 +40,14 @@ pub fn emit(ir: &Ir) -> TokenStream {
     let at_rest = at_rest(ir);
     let alike = s.wiring.iter().flat_map(|wiring| &wiring.alike).map(|set| counts_in(set));
     let uses = s.wiring.is_some().then(|| quote! { , Wiring });
+    let play_memory = s.risen.as_ref().is_some_and(|rest| rest.plays.is_some());
+    let play_memory = play_memory.then(|| quote! { use specgen_runtime::PlayMemory; });
     let limits = s.risen.is_none().then(|| quote! { , limits });
     quote! {
         #![doc = " Thresholds and times of the supervisor's faults; from `supervisor`."]
 
         use specgen_law::Reset;
+        #play_memory
         use specgen_runtime::supervisor::{Steadiness, Supervision #uses};
 
         use crate::identity::Constants;
@@ -72,10 +75,11 @@ fn counts_in(words: &[u32]) -> TokenStream {
 
 /// Memories of the legs at the lowest voltage after a sweep to the highest and back.
 fn new_memories(ir: &Ir) -> TokenStream {
-    let Some(RateModel::BoucWen { legs }) = &ir.hysteresis.rate else { return quote! { [Memory::new(); 6] } };
-    let memories = legs.iter().map(|leg| {
-        let rest = literal::real(ir.scalar, leg.rest);
-        quote! { Memory::new(#rest) }
+    let Some(RateModel::BoucWen { legs, plays }) = &ir.hysteresis.rate else { return quote! { [Memory::new(); 6] } };
+    let memories = legs.iter().enumerate().map(|(leg, own)| {
+        let (rest, leg) = (literal::real(ir.scalar, own.rest), literal::count(leg));
+        let plays = plays.as_ref().map(|_| quote! { &crate::hysteresis::PLAYS_OF_LEGS[#leg], });
+        quote! { Memory::at_rest(#plays #rest) }
     });
     quote! { [#(#memories),*] }
 }
@@ -99,9 +103,14 @@ fn at_rest(ir: &Ir) -> TokenStream {
                     let rate = real(rest.rate[leg]);
                     quote! { , #rate }
                 });
-                match &rest.bouc_wen {
-                    None => quote! { Memory::risen(#drive, #displacement #rate) },
-                    Some(parts) => {
+                match (&rest.bouc_wen, &rest.plays) {
+                    (None, _) => quote! { Memory::risen(#drive, #displacement #rate) },
+                    (Some(parts), Some(plays)) => {
+                        let [still, z] = parts[leg].map(real);
+                        let states = literal::reals(ir.scalar, &plays[leg]);
+                        quote! { Memory::risen(PlayMemory::risen(#drive, #still, [#states]), #z, #displacement) }
+                    }
+                    (Some(parts), None) => {
                         let [still, z] = parts[leg].map(real);
                         quote! { Memory::risen(#drive, #still, #z, #displacement) }
                     }

@@ -49,7 +49,9 @@ pub(super) fn lower(
     let mut crc = Crc32::new();
     crc.bytes(identity.as_bytes());
     let mut add = |values: &[f64]| values.iter().for_each(|value| crc.word(word(value)));
-    hysteresis.tables.iter().for_each(|table| add(table));
+    if !hysteresis.has_plays() {
+        hysteresis.tables.iter().for_each(|table| add(table));
+    }
     match &hysteresis.rate {
         None => {}
         Some(RateModel::DynamicPreisach { tables, tolerance: _, table_of_leg: _ }) => {
@@ -59,7 +61,10 @@ pub(super) fn lower(
             [gains, weights, carried].into_iter().for_each(|values| add(values));
             add(&[*direct]);
         }
-        Some(RateModel::BoucWen { legs }) => legs.iter().for_each(|leg| add(&leg.numbers())),
+        Some(RateModel::BoucWen { legs, plays }) => {
+            legs.iter().for_each(|leg| add(&leg.numbers()));
+            plays.iter().flat_map(|plays| plays.iter()).for_each(|leg| add(&leg.numbers()));
+        }
     }
     for trajectory in task.iter().flat_map(|task| &task.setpoints.trajectories) {
         match &trajectory.path {

@@ -115,7 +115,7 @@ fn legs(hysteresis: &Hysteresis, bounds: &Bounds, kinematics: &Kinematics) -> [f
             (still + hysteresis.grid as f64 * rate, rate)
         }
         Some(RateModel::Creep { weights, .. }) => (still * (1.0 + weights.iter().map(|w| w.abs()).sum::<f64>()), 0.0),
-        Some(RateModel::BoucWen { legs }) => {
+        Some(RateModel::BoucWen { legs, .. }) => {
             let creep = legs.iter().map(|leg| leg.travel[1] * (1.0 + leg.weights.iter().sum::<f64>()));
             (largest(creep.chain([still])), 0.0)
         }

@@ -1,8 +1,8 @@
 //! Rate dependence of the leg model: constants at the period of the spec.
 
-use crate::ir::{BoucWen, LEGS, Lead, RateModel, Resonance, Scalar};
+use crate::ir::{BoucWen, LEGS, Lead, Plays, RateModel, Resonance, Scalar};
 use specgen_identify::everett::EverettTable;
-use specgen_identify::leg_model::{Around, strokes};
+use specgen_identify::leg_model::{Around, WidenedPlays, strokes};
 use specgen_identify::mean;
 use specgen_language::model::{Model, RateDependence};
 
@@ -125,7 +125,33 @@ fn bouc_wen(model: &Model, tables: &[EverettTable], around: &[Option<Around>], s
             rest: round(own.rest_um * UNIT),
         }
     };
-    RateModel::BoucWen { legs: Box::new(core::array::from_fn(leg)) }
+    // Legs of one controller have one kind of model. The table of each leg is its plays at rest.
+    let plays: Option<Vec<Plays>> = (0..LEGS)
+        .map(|leg| {
+            let own = around[if around.len() == LEGS { leg } else { 0 }].as_ref()?.plays.as_ref()?;
+            Some(plays(own, model.hysteresis.grid, volts_per_cell, period, scalar))
+        })
+        .collect();
+    let plays = plays.and_then(|plays| plays.try_into().ok());
+    RateModel::BoucWen { legs: Box::new(core::array::from_fn(leg)), plays: plays.map(Box::new) }
+}
+
+/// Plays that widen, in m and cells of a `grid`.
+fn plays(own: &WidenedPlays, grid: usize, volts_per_cell: f64, period: f64, scalar: Scalar) -> Plays {
+    let round = |value: f64| scalar.round(value);
+    let thresholds: Vec<f64> = own.thresholds.iter().map(|r| round(r / volts_per_cell)).collect();
+    let weights: Vec<f64> = own.weights.iter().map(|w| round(w * 1e-6 * volts_per_cell)).collect();
+    let sum = |of: &dyn Fn(usize) -> f64| (0..weights.len()).fold(0.0, |sum, k| sum + of(k));
+    Plays {
+        full_scale: grid as f64,
+        slope: round(sum(&|k| weights[k])),
+        rest: round(sum(&|k| weights[k] * thresholds[k])),
+        widening: round(own.kappa),
+        per_rate: round(volts_per_cell / (own.v0 * period)),
+        decay: round(libm::exp(-period / own.lag_s)),
+        thresholds,
+        weights,
+    }
 }
 
 /// The dead time less half a period, because a held voltage corresponds to the middle of its tick, and for six legs with

@@ -3,9 +3,9 @@
 use serde::Serialize;
 use specgen_numerics::nnls;
 
-use super::family::{Family, TIMES};
-use super::fit::{PLAYS, Problem, Samples, Shape, Solution, of_play, play};
-use super::{Around, LegModel, READ_OUT, on_grid};
+use super::family::{Family, WIDENED_PLAYS};
+use super::fit::{Creep, PLAYS, Problem, RATE_LAG, Samples, Shape, Solution, V0, of_play, play};
+use super::{Around, LegModel, READ_OUT, WidenedPlays, on_grid};
 use crate::branches::Branch;
 use crate::everett::EverettTable;
 use crate::findings::Findings;
@@ -25,6 +25,11 @@ const SCORED: f64 = 0.1;
 /// A family other than the table may be worse than the best by this share of the least error plus this share of the
 /// gauge's noise: such a difference does not show in motion.
 const WORTHWHILE: [f64; 2] = [0.1, 0.2];
+/// Largest κ, and the first ones that are tried.
+const MOST_WIDENING: f64 = 0.2;
+const FIRST_WIDENINGS: [f64; 4] = [0.0, 5e-3, 1.25e-2, 5e-2];
+/// Plays among which those of the leg are found.
+const FINE_PLAYS: usize = 192;
 /// Fewer folds give no estimate of the spread.
 const FEWEST_FOLDS: usize = 3;
 
@@ -81,7 +86,7 @@ pub fn choose(
         error(&LegModel { table: table.table.clone(), around: None }, table.report.dead_time)?;
     }
     if kind == Kind::Preisach {
-        let family = Family { kind, creep: false };
+        let family = Family { kind, creep: false, widens: false };
         let model = LegModel { table: table.table.clone(), around: None };
         return Ok(Choice { family, model, scores: Vec::new(), table });
     }
@@ -138,7 +143,9 @@ fn chosen(
         Data::new(late.as_ref().unwrap_or(record), &plane, &used, &fold_of, if turned { 0.0 } else { delay });
     data.samples.at_rest = at_rest;
     let mut candidates: Vec<Candidate> = Vec::new();
-    for family in Family::all().into_iter().filter(|family| kind == Kind::Auto || family.kind == kind) {
+    let two_rates = fast >= dead_time::RATE_RATIO * slow;
+    let tried = |family: &Family| (kind == Kind::Auto || family.kind == kind) && (two_rates || !family.widens);
+    for family in Family::all().into_iter().filter(tried) {
         candidates.extend(data.candidate(family, folds));
     }
     candidates
@@ -253,9 +260,23 @@ impl<'a> Data<'a> {
         }
         let mut best: Option<(bool, Problem, Solution)> = None;
         // Bouc-Wen alone has one play, which starts where the drive is.
-        for saturated in if family.has_plays() { &[true, false][..] } else { &[false] } {
-            let problem = Problem::new(&self.samples, family, PLAYS, *saturated);
-            if let Some(solution) = problem.search(None, None)
+        let mut starts = if family.has_plays() { &[true, false][..] } else { &[false] };
+        if family.widens {
+            // Which start it is shows without a rate.
+            let rms = |saturated| {
+                let problem = Problem::new(&self.samples, family, PLAYS, saturated, 0.0);
+                problem.search(None, None).map_or(f64::INFINITY, |solution| solution.rms)
+            };
+            starts = if rms(true) < rms(false) { &[true] } else { &[false] };
+        }
+        for saturated in starts {
+            let fitted = if family.widens {
+                self.widened(family, *saturated)
+            } else {
+                let problem = Problem::new(&self.samples, family, PLAYS, *saturated, 0.0);
+                problem.search(None, None).map(|solution| (problem, solution))
+            };
+            if let Some((problem, solution)) = fitted
                 && best.as_ref().is_none_or(|(.., best)| solution.rms < best.rms)
             {
                 best = Some((*saturated, problem, solution));
@@ -271,15 +292,45 @@ impl<'a> Data<'a> {
         Some(Candidate { family, model, squares, fitted: Some((saturated, solution.shape)) })
     }
 
+    /// Plays that widen: κ, creep and thresholds by turns.
+    fn widened(&self, family: Family, saturated: bool) -> Option<(Problem<'_>, Solution)> {
+        let mut near: Option<Shape> = None;
+        let (mut problem, mut solution) = widest(&FIRST_WIDENINGS, 3, |kappa| {
+            let problem = Problem::new(&self.samples, family, PLAYS, saturated, kappa);
+            let solution = problem.search(near.as_ref(), None)?;
+            near = Some(solution.shape);
+            Some((problem, solution))
+        })?;
+        for rounds in [2, 4] {
+            let kappa = problem.kappa;
+            let shape = problem.with_own_levels(solution.shape);
+            let fine = Problem::new(&self.samples, family, FINE_PLAYS, saturated, kappa);
+            let found = fine.at(shape, None)?;
+            let r = merged(fine.thresholds(), fine.parts(&found.values).0);
+            (problem, solution) = widest(&[kappa], rounds, |kappa| {
+                let problem = Problem::with_thresholds(&self.samples, family, r.clone(), saturated, kappa);
+                problem.search(Some(&shape), None).map(|solution| (problem, solution))
+            })?;
+        }
+        Some((problem, solution))
+    }
+
     /// The chosen model on the grid of the controller. Plays are tabulated on the finest grid that is allowed, with as many
     /// plays as cells: the table is computed from the model, so a finer one is nearer to it. Other tables are interpolated.
     fn on_grid(&self, chosen: Candidate, options: &crate::Options) -> Option<LegModel> {
         let Candidate { family, model, fitted, .. } = chosen;
         let mut chosen = model?;
-        if let Some((saturated, shape)) = fitted.filter(|_| family.has_plays() && options.finest > self.plane.grid) {
+        let finer = options.finest > self.plane.grid;
+        if let Some(plays) = chosen.around.as_ref().and_then(|around| around.plays.as_ref()) {
+            let grid = if finer { options.finest } else { options.grid };
+            chosen.table = plays.table(&Plane { grid, range: self.plane.range });
+            return Some(chosen);
+        }
+        if let Some((saturated, shape)) = fitted.filter(|_| family.has_plays() && finer) {
             let halves = core::iter::successors(Some(options.finest), |grid| Some(grid / 2));
             let finer = halves.take_while(|grid| *grid >= options.grid).find_map(|grid| {
-                let problem = Problem::new(&self.samples, family, if grid > PLAYS { grid } else { PLAYS }, saturated);
+                let problem =
+                    Problem::new(&self.samples, family, if grid > PLAYS { grid } else { PLAYS }, saturated, 0.0);
                 model_of(&problem, &problem.at(shape, None)?, &Plane { grid, range: self.plane.range })
             });
             if finer.is_some() {
@@ -295,10 +346,10 @@ impl<'a> Data<'a> {
     /// Everett tables, after creep of the level that plays show.
     fn tables(&self, family: Family, folds: usize) -> Option<Candidate> {
         let creep = if family.creep {
-            let plays = Family { kind: Kind::GeneralizedPlays, creep: true };
-            Problem::new(&self.samples, plays, PLAYS, true).search(None, None)?.shape.creep
+            let plays = Family { kind: Kind::GeneralizedPlays, creep: true, widens: false };
+            Problem::new(&self.samples, plays, PLAYS, true, 0.0).search(None, None)?.shape.creep
         } else {
-            0.0
+            Creep::NONE
         };
         let h = self.whole.without_creep(creep);
         let table = self.table(&h, None)?;
@@ -317,7 +368,7 @@ impl<'a> Data<'a> {
         });
         let squares = squares.collect();
         let model = family.creep.then(|| LegModel {
-            around: Some(Around { creep: terms(creep), ..Around::of_table(&table) }),
+            around: Some(Around { creep: creep.terms(), ..Around::of_table(&table) }),
             table: table.clone(),
         });
         let model = model.or(Some(LegModel { table, around: None }));
@@ -352,9 +403,57 @@ impl<'a> Data<'a> {
     }
 }
 
-/// Creep operators of one level.
-fn terms(creep: f64) -> Vec<[f64; 2]> {
-    if creep > 0.0 { TIMES.map(|tau| [tau, creep]).to_vec() } else { Vec::new() }
+/// The fit with the κ of the least residual: `from` and its surroundings within a factor of 1 ± `span`.
+fn widest<'p>(
+    from: &[f64],
+    rounds: i32,
+    mut fitted: impl FnMut(f64) -> Option<(Problem<'p>, Solution)>,
+) -> Option<(Problem<'p>, Solution)> {
+    let mut best: Option<(f64, (Problem, Solution))> = None;
+    for round in 0..rounds {
+        let trials = match &best {
+            None => from.to_vec(),
+            Some((kappa, _)) => {
+                let span = 0.4 * kappa * libm::ldexp(1.0, -round);
+                vec![kappa - span, kappa + span]
+            }
+        };
+        for kappa in trials.into_iter().filter(|kappa| *kappa >= 0.0 && *kappa <= MOST_WIDENING) {
+            if let Some(found) = fitted(kappa)
+                && best.as_ref().is_none_or(|(_, best)| found.1.rms < best.1.rms)
+            {
+                best = Some((kappa, found));
+            }
+        }
+    }
+    best.map(|(_, found)| found)
+}
+
+/// [`WIDENED_PLAYS`] thresholds in place of `r`: those with a weight, neighbours joined where it changes the displacement least.
+/// Without this, an evenly spaced play is up to half a spacing from where the leg has one.
+fn merged(r: &[f64], weights: &[f64]) -> Vec<f64> {
+    let pairs = r.iter().zip(weights).enumerate();
+    let carrying = pairs.filter(|(k, (_, w))| *k == 0 || **w > 0.0);
+    let mut plays: Vec<[f64; 2]> = carrying.map(|(_, (r, w))| [*r, *w]).collect();
+    while plays.len() > WIDENED_PLAYS {
+        let cost = |k: usize| {
+            let ([a, v], [b, w]) = (plays[k], plays[k + 1]);
+            v * w / (v + w) * (b - a)
+        };
+        let least = (1..plays.len() - 1).reduce(|a, b| if cost(b) < cost(a) { b } else { a });
+        let Some(k) = least else { break };
+        let [b, w] = plays.remove(k + 1);
+        let [a, v] = plays[k];
+        plays[k] = [(v * a + w * b) / (v + w), v + w];
+    }
+    let mut r: Vec<f64> = plays.iter().map(|play| play[0]).collect();
+    // As many as the controller has: further ones at the end carry nothing.
+    while r.len() < WIDENED_PLAYS {
+        let widest = (1..r.len()).reduce(|a, b| if r[b] - r[b - 1] > r[a] - r[a - 1] { b } else { a });
+        let Some(k) = widest else { break };
+        r.insert(k, 0.5 * (r[k - 1] + r[k]));
+    }
+    r
 }
 
 /// The solution as a table and the parameters beside it; none if it cannot be inverted.
@@ -362,7 +461,7 @@ fn model_of(problem: &Problem, solution: &Solution, plane: &Plane) -> Option<Leg
     let Problem { family, unit, .. } = *problem;
     let (weights, taken, constant, read_out) = problem.parts(&solution.values);
     let [low, high] = plane.range;
-    let r = problem.thresholds();
+    let r = problem.thresholds().to_vec();
     // Σ f_i at plays that `place` gives, µm.
     let sum = |place: &dyn Fn(f64) -> f64| {
         let (mut sum, mut weights) = (0.0, weights.iter());
@@ -393,8 +492,23 @@ fn model_of(problem: &Problem, solution: &Solution, plane: &Plane) -> Option<Leg
         power *= unit;
         *own = b / power;
     }
-    let mut around =
-        Around { read_out: own, travel_um: unit, slope: taken, beta, gamma, rest_um: 0.0, creep: terms(creep) };
+    let mut around = Around {
+        read_out: own,
+        travel_um: unit,
+        slope: taken,
+        beta,
+        gamma,
+        rest_um: 0.0,
+        creep: creep.terms(),
+        plays: None,
+    };
+    around.plays = family.widens.then(|| WidenedPlays {
+        kappa: problem.kappa,
+        v0: V0,
+        lag_s: RATE_LAG,
+        thresholds: r.clone(),
+        weights: weights.to_vec(),
+    });
     let saturated = if taken > 0.0 { taken / plus } else { 0.0 };
     around.rest_um = around.state_after(saturated, low - high);
     let rest = sum(&|r| low + r) - around.rest_um + constant;
@@ -415,7 +529,8 @@ fn model_of(problem: &Problem, solution: &Solution, plane: &Plane) -> Option<Leg
     let cell = (high - low) / plane.grid as f64;
     let steepest = if taken > 0.0 { taken * if minus > 0.0 { 1.0 + minus / plus } else { 1.0 } } else { 0.0 };
     let rises = (0..plane.grid).all(|k| table.node(k + 1, k) * 1e6 > steepest * cell);
-    rises.then_some(LegModel { table, around: Some(around) })
+    let usable = rises && around.plays.as_ref().is_none_or(WidenedPlays::is_valid);
+    usable.then_some(LegModel { table, around: Some(around) })
 }
 
 /// Coefficients of the polynomial about `place`, without its value there.

@@ -13,6 +13,12 @@ use crate::statistics::mean;
 
 /// Plays of a family that has them, in the search and in the choice of the family.
 pub(super) const PLAYS: usize = 32;
+/// v₀ of the widening, V/s, and time constant of the filter of the rate, s.
+pub(super) const V0: f64 = 20.0;
+pub(super) const RATE_LAG: f64 = 2e-3;
+/// Steps of plays that widen while their rate changes, s, and the change of the rate that counts, of the rate and v₀.
+const WIDENING_STEP: f64 = 2.5e-4;
+const STEADY: f64 = 0.01;
 /// Largest creep level.
 const MOST_CREEP: f64 = 0.03;
 /// Slow starts of the creep that a record may show: those of the first time constants.
@@ -94,9 +100,10 @@ impl Samples {
         sum / count as f64
     }
 
-    /// The h whose creep of level `c` gives y; at rest at the first sample of each record.
-    pub(super) fn without_creep(&self, c: f64) -> Vec<f64> {
-        let rest = |y: f64| y / (1.0 + c * TIMES.len() as f64);
+    /// The h whose creep gives y; at rest at the first sample of each record.
+    pub(super) fn without_creep(&self, Creep { level, shares }: Creep) -> Vec<f64> {
+        let all_shares = shares.iter().fold(0.0, |sum, share| sum + share);
+        let rest = |y: f64| y / (1.0 + level * all_shares);
         let mut h = rest(self.y.first().copied().unwrap_or(0.0));
         let mut states = [h; TIMES.len()];
         let mut all = vec![h];
@@ -108,12 +115,12 @@ impl Samples {
                 continue;
             }
             let (mut carried, mut direct) = (0.0, 1.0);
-            for (state, [decay, known, now]) in states.iter_mut().zip(step) {
+            for ((state, [decay, known, now]), share) in states.iter_mut().zip(step).zip(shares) {
                 *state = decay * *state + known * h;
-                carried += *state;
-                direct += c * now;
+                carried += share * *state;
+                direct += level * (share * now);
             }
-            h = (y - c * carried) / direct;
+            h = (y - level * carried) / direct;
             states.iter_mut().zip(step).for_each(|(state, part)| *state += part[2] * h);
             all.push(h);
         }
@@ -121,7 +128,7 @@ impl Samples {
     }
 
     /// The residual of y that a residual `h` before the creep causes; creep states begin at 0 in each record.
-    pub(super) fn with_creep(&self, c: f64, h: &[f64]) -> Vec<f64> {
+    pub(super) fn with_creep(&self, Creep { level, shares }: Creep, h: &[f64]) -> Vec<f64> {
         let mut states = [0.0; TIMES.len()];
         let mut all = vec![h[0]];
         for (step, pair) in self.steps.iter().zip(h.windows(2)) {
@@ -131,21 +138,49 @@ impl Samples {
                 continue;
             }
             let mut sum = 0.0;
-            for (state, [decay, known, now]) in states.iter_mut().zip(step) {
+            for ((state, [decay, known, now]), share) in states.iter_mut().zip(step).zip(shares) {
                 *state = decay * *state + known * pair[0] + now * pair[1];
-                sum += *state;
+                sum += share * *state;
             }
-            all.push(pair[1] + c * sum);
+            all.push(pair[1] + level * sum);
         }
         all
+    }
+}
+
+/// Weights of the creep operators with the time constants [`TIMES`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Creep {
+    /// c.
+    pub(super) level: f64,
+    /// Weight of each operator over c; 1 until they are fitted one by one.
+    pub(super) shares: [f64; TIMES.len()],
+}
+
+impl Creep {
+    pub(super) const NONE: Self = Self::even(0.0);
+
+    /// Equal weights.
+    pub(super) const fn even(level: f64) -> Self {
+        Self { level, shares: [1.0; TIMES.len()] }
+    }
+
+    /// The same shares of another level.
+    const fn at(self, level: f64) -> Self {
+        Self { level, shares: self.shares }
+    }
+
+    /// Time constant (s) and weight of each operator.
+    pub(super) fn terms(self) -> Vec<[f64; 2]> {
+        let terms = TIMES.into_iter().zip(self.shares).map(|(tau, share)| [tau, self.level * share]);
+        if self.level > 0.0 { terms.collect() } else { Vec::new() }
     }
 }
 
 /// Searched unknowns.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Shape {
-    /// c.
-    pub(super) creep: f64,
+    pub(super) creep: Creep,
     /// β + γ, 1/V.
     pub(super) beta_plus_gamma: f64,
     /// β − γ, 1/V.
@@ -158,8 +193,10 @@ pub(super) struct Shape {
 pub(super) struct Problem<'a> {
     pub(super) samples: &'a Samples,
     pub(super) family: Family,
-    /// Number of plays of a family that has them.
-    plays: usize,
+    /// Thresholds of its plays, V.
+    r: Vec<f64>,
+    /// κ of plays that widen.
+    pub(super) kappa: f64,
     /// Largest |y|: the unit of the read-out's polynomial, µm.
     pub(super) unit: f64,
     /// Of each sample: the plays' columns, then 1 and the starts of the creep.
@@ -201,6 +238,50 @@ pub(super) fn play(p: f64, r: f64, u: f64, range: [f64; 2]) -> f64 {
     saturate(saturate(p, [u - r, u + r]), [range[0] + r, range[1] - r])
 }
 
+/// Rate of the drive that widens plays, and by how much.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct RateFilter {
+    pub(super) kappa: f64,
+    /// V/s.
+    pub(super) v0: f64,
+    /// s.
+    pub(super) lag: f64,
+}
+
+/// Plays that widen with the rate, along a drive of straight lines.
+pub(super) struct Widening {
+    pub(super) filter: RateFilter,
+    /// Filtered rate, V/s.
+    pub(super) rate: f64,
+    pub(super) time: f64,
+    pub(super) drive: f64,
+}
+
+impl Widening {
+    /// Moves the plays `states` (V) with thresholds `r` to a `drive` at a `time`.
+    pub(super) fn advance(&mut self, states: &mut [f64], r: &[f64], time: f64, drive: f64) {
+        let whole = time - self.time;
+        if whole <= 0.0 {
+            return;
+        }
+        let RateFilter { kappa, v0, lag } = self.filter;
+        let (slope, from) = ((drive - self.drive) / whole, self.drive);
+        let mut done = 0.0;
+        while done < whole {
+            let steady = (slope - self.rate).abs() < STEADY * (v0 + slope.abs());
+            let step = if steady || whole - done < WIDENING_STEP { whole - done } else { WIDENING_STEP };
+            done = if steady { whole } else { done + step };
+            self.rate = slope + (self.rate - slope) * libm::exp(-step / lag);
+            let scale = 1.0 + kappa * libm::log1p(self.rate.abs() / v0);
+            let u = if done < whole { from + slope * done } else { drive };
+            for (p, r) in states.iter_mut().zip(r) {
+                *p = saturate(*p, [u - scale * r, u + scale * r]);
+            }
+        }
+        (self.time, self.drive) = (time, drive);
+    }
+}
+
 /// Thresholds of the plays of a family, V: evenly from 0 to half the range.
 fn thresholds(family: Family, plays: usize, range: [f64; 2]) -> Vec<f64> {
     let count = if family.has_plays() { plays } else { 1 };
@@ -208,12 +289,25 @@ fn thresholds(family: Family, plays: usize, range: [f64; 2]) -> Vec<f64> {
 }
 
 impl<'a> Problem<'a> {
-    /// `saturated`: the plays begin as after a fall from the highest drive, not as built.
-    pub(super) fn new(samples: &'a Samples, family: Family, plays: usize, saturated: bool) -> Self {
+    /// `saturated`: the plays begin as after a fall from the highest drive, not as built. They widen by `kappa`.
+    pub(super) fn new(samples: &'a Samples, family: Family, plays: usize, saturated: bool, kappa: f64) -> Self {
+        Self::with_thresholds(samples, family, thresholds(family, plays, samples.range), saturated, kappa)
+    }
+
+    /// The same with the thresholds `r` (V) of its plays.
+    pub(super) fn with_thresholds(
+        samples: &'a Samples,
+        family: Family,
+        r: Vec<f64>,
+        saturated: bool,
+        kappa: f64,
+    ) -> Self {
         let range = samples.range;
-        let r = thresholds(family, plays, range);
         let first = samples.drive[0];
-        let start = |r: &f64| play(first + if saturated { *r } else { 0.0 }, *r, first, range);
+        // As built, a play is where the drive is: below the least place of its range after a sweep.
+        let as_built = !saturated && !family.is_cubic();
+        let start =
+            |r: &f64| if as_built { first } else { play(first + if saturated { *r } else { 0.0 }, *r, first, range) };
         let mut states: Vec<f64> = r.iter().map(start).collect();
         let starts = if family.creeps() && !family.floats() { STARTS } else { 0 };
         let bounded = r.len() * if family.is_cubic() { 3 } else { 1 };
@@ -223,10 +317,17 @@ impl<'a> Problem<'a> {
         let records = samples.parts.len() + 1;
         let width = bounded + 1 + (0..records).map(starts_of).sum::<usize>();
         let mut fixed = Vec::with_capacity(width * samples.time.len());
+        let filter = RateFilter { kappa, v0: V0, lag: RATE_LAG };
+        let mut widening = Widening { filter, rate: 0.0, time: samples.time[0], drive: first };
         for (k, (u, t)) in samples.drive.iter().zip(&samples.time).enumerate() {
             interrupt::point();
+            if family.widens {
+                widening.advance(&mut states, &r, *t, *u);
+            }
             for (p, r) in states.iter_mut().zip(&r) {
-                *p = play(*p, *r, *u, range);
+                if !family.widens {
+                    *p = if as_built { saturate(*p, [u - r, u + r]) } else { play(*p, *r, *u, range) };
+                }
                 of_play(family, range, *r, *p, &mut |value| fixed.push(value));
             }
             fixed.push(1.0);
@@ -260,12 +361,12 @@ impl<'a> Problem<'a> {
         };
         let grams = grams.into_iter().map(whole).collect();
         let unit = samples.y.iter().fold(0.0, |most: f64, y| if y.abs() > most { y.abs() } else { most });
-        Self { samples, family, plays, unit, fixed, width, bounded, grams }
+        Self { samples, family, r, kappa, unit, fixed, width, bounded, grams }
     }
 
     /// Thresholds of its plays, V.
-    pub(super) fn thresholds(&self) -> Vec<f64> {
-        thresholds(self.family, self.plays, self.samples.range)
+    pub(super) fn thresholds(&self) -> &[f64] {
+        &self.r
     }
 
     /// z, V, at each sample.
@@ -395,16 +496,17 @@ impl<'a> Problem<'a> {
     pub(super) fn search(&self, near: Option<&Shape>, out: Option<usize>) -> Option<Solution> {
         let range = self.samples.range[1] - self.samples.range[0];
         let start = near.copied().unwrap_or(Shape {
-            creep: if self.family.creeps() { 5e-3 } else { 0.0 },
+            creep: Creep::even(if self.family.creeps() { 5e-3 } else { 0.0 }),
             beta_plus_gamma: 5.0 / range,
             beta_minus_gamma: 1.0 / range,
             start: -0.3,
         });
         let of = |unknowns: &[f64]| {
-            let (creep, rest) = match (self.family.creeps(), unknowns) {
+            let (level, rest) = match (self.family.creeps(), unknowns) {
                 (true, [c, rest @ ..]) => (saturate(*c * 1e-2, [0.0, MOST_CREEP]), rest),
                 (_, rest) => (0.0, rest),
             };
+            let creep = start.creep.at(level);
             let [beta_plus_gamma, share, begun] = *rest else { return Shape { creep, ..start } };
             let beta_plus_gamma = saturate(libm::exp(beta_plus_gamma), [0.5, 500.0]) / range;
             let share = saturate(share, [-0.95, 3.0]);
@@ -418,7 +520,7 @@ impl<'a> Problem<'a> {
         let (mut unknowns, mut steps) = (Vec::new(), Vec::new());
         let fine = if near.is_some() { 0.1 } else { 1.0 };
         if self.family.creeps() {
-            unknowns.push(start.creep * 1e2);
+            unknowns.push(start.creep.level * 1e2);
             steps.push(0.3 * fine);
         }
         if self.family.has_state() {
@@ -433,13 +535,30 @@ impl<'a> Problem<'a> {
             start
         } else {
             let most = SEARCH[usize::from(near.is_some())] * unknowns.len();
-            let cost = |unknowns: &[f64]| {
-                self.solve(&of(unknowns), out)
-                    .map_or(f64::INFINITY, |(_, found)| self.samples.mean_square(&found, out, self.family.floats()))
-            };
-            of(&simplex(&unknowns, &steps, most, cost).0)
+            of(&simplex(&unknowns, &steps, most, |unknowns| self.mean_square(&of(unknowns), out)).0)
         };
         self.at(best, out)
+    }
+
+    /// The same with a creep level of its own for each operator.
+    pub(super) fn with_own_levels(&self, best: Shape) -> Shape {
+        let level = best.creep.level;
+        if level <= 0.0 {
+            return best;
+        }
+        let of = |unknowns: &[f64]| {
+            let mut shares = [0.0; TIMES.len()];
+            shares.iter_mut().zip(unknowns).for_each(|(share, c)| *share = saturate(*c, [0.0, MOST_CREEP / level]));
+            Shape { creep: Creep { level, shares }, ..best }
+        };
+        let cost = |unknowns: &[f64]| self.mean_square(&of(unknowns), None);
+        of(&simplex(&best.creep.shares, &[0.5; TIMES.len()], SEARCH[0] * TIMES.len(), cost).0)
+    }
+
+    /// Mean square of what the best fit with these unknowns leaves of the samples that are not of fold `out`, µm².
+    fn mean_square(&self, shape: &Shape, out: Option<usize>) -> f64 {
+        let left = |(_, found): (_, Vec<f64>)| self.samples.mean_square(&found, out, self.family.floats());
+        self.solve(shape, out).map_or(f64::INFINITY, left)
     }
 
     /// The solution with these unknowns, over the samples that are not of fold `out`.

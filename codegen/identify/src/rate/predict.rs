@@ -199,7 +199,7 @@ pub fn predict(model: &RateModel, drive: &Drive) -> Result<Prediction, Vec<Diagn
         memory.push(drive.drive[first]);
         let (mut still, rate) = forward::still(model, &plane, &drive.time, &drive.drive, first, memory);
         if let Some(around) = &model.around {
-            around.complete(&mut still, &drive.drive[first..], plane.range, full);
+            around.complete(&mut still, &time, &drive.drive[first..], plane.range, full);
         }
         (still, rate)
     };

@@ -245,8 +245,11 @@ fn every_model<T: Real, const N: usize, const NODES: usize, const CAP: usize>(se
         rest: T::from_f64(-1.9e-6),
     };
     let of_bouc_wen = alike(
-        (BoucWenMemory::<T, CAP, 3>::new(around.rest), &BoucWenEverett { still: emitted(still), around: &around }),
-        (BoucWenMemory::<T, ROOM, 3>::new(around.rest), &BoucWenEverett { still: at_run_time(still), around: &around }),
+        (BoucWenMemory::<T, CAP, 3>::at_rest(around.rest), &BoucWenEverett { still: emitted(still), around: &around }),
+        (
+            BoucWenMemory::<T, ROOM, 3>::at_rest(around.rest),
+            &BoucWenEverett { still: at_run_time(still), around: &around },
+        ),
         sizes,
     );
     [dropped, of_rate, of_creep, of_bouc_wen].into_iter().min().unwrap()

@@ -12,6 +12,7 @@ mod geometry;
 mod grid;
 mod learning;
 mod owing;
+mod plays;
 mod preisach;
 mod rate;
 mod real;

@@ -334,14 +334,14 @@ fn every_word_of_the_reversal_memories_counts() {
     check(&CreepMemory::<f64, CAP, 3>::new(), creep(), &all, CreepMemory::digest);
     let bouc_wen = || plain().reals(2 + 3 + 1);
     let all: Vec<usize> = used(&plain()).into_iter().chain(Plain::WORDS..Plain::WORDS + 6).collect();
-    check(&BoucWenMemory::<f64, CAP, 3>::new(0.0), bouc_wen(), &all, BoucWenMemory::digest);
+    check(&BoucWenMemory::<f64, CAP, 3>::at_rest(0.0), bouc_wen(), &all, BoucWenMemory::digest);
     let restored = restore(&Plain::new(), &plain().0).unwrap();
     assert_eq!((restored.drive(), restored.depth(), restored.dropped()), (10.0, USED, 3));
     whole_within(&restored, 1, 0, u32::MAX.into());
     numbers_within(&restored, [3].into_iter().chain(4 + CAP..Plain::WORDS), SIZES.leg);
     let creeping = restore(&CreepMemory::<f64, CAP, 3>::new(), &creep().0).unwrap();
     numbers_within(&creeping, Plain::WORDS..Plain::WORDS + 4, SIZES.leg);
-    let losing = restore(&BoucWenMemory::<f64, CAP, 3>::new(0.0), &bouc_wen().0).unwrap();
+    let losing = restore(&BoucWenMemory::<f64, CAP, 3>::at_rest(0.0), &bouc_wen().0).unwrap();
     numbers_within(&losing, [Plain::WORDS].into_iter().chain(Plain::WORDS + 2..Plain::WORDS + 6), SIZES.leg);
     let changing = restore(&DynamicMemory::<f64, CAP>::new(), &dynamic().0).unwrap();
     let rates = Plain::WORDS..Plain::WORDS + CAP;

@@ -1,6 +1,6 @@
 //! The rest voltage of the legs.
 
-use crate::ir::{Actuation, Hysteresis, LEGS, RateModel, Rest, Scalar};
+use crate::ir::{Actuation, Hysteresis, LEGS, Plays, RateModel, Rest, Scalar};
 use specgen_language::diagnostic::{Diagnostic, codes};
 use specgen_language::model::Model;
 
@@ -44,10 +44,15 @@ pub(super) fn risen(code: i32, hysteresis: &Hysteresis, actuation: &Actuation, s
         Some(RateModel::DynamicPreisach { tables, table_of_leg, .. }) => of_legs(tables, table_of_leg),
         _ => [0.0; LEGS],
     };
-    let displacement = of_legs(&hysteresis.tables, &hysteresis.table_of_leg);
-    let Some(RateModel::BoucWen { legs }) = &hysteresis.rate else {
-        return Some(Rest { drive, displacement, rate, bouc_wen: None });
+    let mut displacement = of_legs(&hysteresis.tables, &hysteresis.table_of_leg);
+    let Some(RateModel::BoucWen { legs, plays }) = &hysteresis.rate else {
+        return Some(Rest { drive, displacement, rate, bouc_wen: None, plays: None });
     };
+    let plays = plays.as_ref().map(|plays| {
+        let each = plays.each_ref().map(|plays| rise(plays, drive, scalar));
+        displacement = each.each_ref().map(|(_, p)| *p);
+        Box::new(each.map(|(states, _)| states))
+    });
     // As the runtime, in small steps of the drive.
     const STEPS: u32 = 4096;
     let at_rest = |leg: usize| {
@@ -60,7 +65,20 @@ pub(super) fn risen(code: i32, hysteresis: &Hysteresis, actuation: &Actuation, s
     };
     let all: [[f64; 3]; LEGS] = core::array::from_fn(at_rest);
     let parts = all.map(|[still, z, _]| [still, z]);
-    Some(Rest { drive, displacement: all.map(|[.., h]| h), rate, bouc_wen: Some(parts) })
+    Some(Rest { drive, displacement: all.map(|[.., h]| h), rate, bouc_wen: Some(parts), plays })
+}
+
+/// Plays after a slow rise from rest to `drive` (cells), and P there, m, with the runtime's roundings.
+fn rise(plays: &Plays, drive: f64, scalar: Scalar) -> (Vec<f64>, f64) {
+    let round = |value: f64| scalar.round(value);
+    let (mut states, mut sum) = (Vec::new(), 0.0);
+    for (r, w) in plays.thresholds.iter().zip(&plays.weights) {
+        let state = if drive >= 2.0 * r { -r } else { round(r - drive) };
+        sum = round(sum + round(w * state));
+        states.push(state);
+    }
+    let p = round(round(round(plays.slope * drive) + sum) - plays.rest);
+    (states, p)
 }
 
 /// E(`drive`, 0), with the roundings of `specgen_runtime::Grid::rising`. `nodes` as in [`Hysteresis::tables`].
