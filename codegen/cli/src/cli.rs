@@ -80,6 +80,9 @@ struct Cli {
     build: build::Arguments,
     #[command(flatten)]
     common: Common,
+    /// The command line, without the program.
+    #[arg(skip)]
+    words: Vec<String>,
 }
 
 /// Options of every command.
@@ -236,9 +239,11 @@ pub fn call(
 /// The arguments, as a struct and by their names.
 fn parsed(arguments: impl IntoIterator<Item = OsString>) -> Result<(Cli, ArgMatches), clap::Error> {
     let mut command = command();
-    let matches = command.try_get_matches_from_mut(arguments)?;
+    let arguments: Vec<OsString> = arguments.into_iter().collect();
+    let matches = command.try_get_matches_from_mut(&arguments)?;
     let cli = Cli::from_arg_matches(&matches).map_err(|error| error.format(&mut command))?;
-    Ok((cli, matches))
+    let words = arguments.iter().skip(1).map(|word| word.to_string_lossy().into_owned()).collect();
+    Ok((Cli { words, ..cli }, matches))
 }
 
 /// Runs the requested command.
@@ -270,7 +275,7 @@ fn perform(cli: &Cli, matches: &ArgMatches, ui: &mut Ui) -> Result<(), Failure> 
         Some(Command::Replay(arguments)) => replay::run(arguments, ui),
         Some(Command::Export(arguments)) => export::run(arguments, ui),
         Some(Command::Dynamics(arguments)) => dynamics::run(arguments, ui),
-        Some(Command::Identify(arguments)) => identify::run(arguments, ui),
+        Some(Command::Identify(arguments)) => identify::run(arguments, &cli.words, ui),
         Some(Command::Forc(arguments)) => forc::run(arguments, ui),
         Some(Command::Plant(arguments)) => plant::run(arguments, ui),
         Some(Command::Doctor(arguments)) => doctor::run(arguments, ui),

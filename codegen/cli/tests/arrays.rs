@@ -80,9 +80,49 @@ fn arrays_have_the_numbers_of_the_csv() {
             assert_eq!(run.code, 0, "{line:?}: {}", run.stderr);
         }
     }
-    let run = folder.run(&["sim", "legs.toml", "--seconds", "0.05", "--record", "run.npz"]);
-    assert!(run.code != 0 && run.stderr.contains("only tables"), "{}", run.stderr);
     check_with_python(&folder);
+}
+
+#[test]
+fn what_is_no_table_is_refused_before_the_run() {
+    let folder = Folder::new();
+    let begun = std::time::Instant::now();
+    let mut line = ["sim", "legs.toml", "--seconds", "100000", "--record", "run.npz"];
+    let run = folder.run(&line);
+    let is_refused = run.code == 2 && run.stderr.contains("only tables are written") && run.stderr.contains("`run`");
+    assert!(is_refused && begun.elapsed().as_secs() < 20, "{} {}", run.code, run.stderr);
+    (line[3], line[5]) = ("0.05", "run");
+    assert_eq!(folder.run(&line).code, 0);
+    for line in [&["report", "legs.toml", "-o", "report.mat"][..], &["replay", "run", "--mcap", "run.npz"]] {
+        let run = folder.run(line);
+        assert!(run.code == 2 && run.stderr.contains("only tables are written"), "{line:?}: {}", run.stderr);
+    }
+}
+
+#[test]
+fn tables_of_other_programs_become_arrays_and_return() {
+    let folder = Folder::new();
+    for (text, wanted) in [
+        ("a,b/c\n# one, two\n1.5,2\n3,4\n", "a,b_per_c\n# one, two\n# column b_per_c is `b/c`\n1.5,2.0\n3.0,4.0\n"),
+        (
+            "a;b:c;b\\c\n1,5;2;3\n2,5;4;5\n",
+            "a,b_c,b_c_2\n# column b_c is `b:c`\n# column b_c_2 is `b\\c`\n1.5,2.0,3.0\n2.5,4.0,5.0\n",
+        ),
+    ] {
+        folder.write("table.csv", text);
+        for form in ["npz", "mat"] {
+            let arrays = format!("table.{form}");
+            assert_eq!(folder.run(&["export", "table", "table.csv", "-o", &arrays]).code, 0, "{form}");
+            let run = folder.run(&["export", "table", &arrays, "-o", "back.csv"]);
+            assert!(run.code == 0, "{form}: {}", run.stderr);
+            assert_eq!(folder.read("back.csv"), wanted, "{form}");
+        }
+    }
+    folder.write("empty.csv", "a,b\n");
+    assert_eq!(folder.run(&["export", "table", "empty.csv", "-o", "empty.npz"]).code, 0);
+    folder.write("text.csv", "a; b\nno table\n");
+    let run = folder.run(&["export", "table", "text.csv", "-o", "text.npz"]);
+    assert!(run.code != 0 && run.stderr.contains("there is no table"), "{}", run.stderr);
 }
 
 /// What NumPy and SciPy read are the bits of the CSV.

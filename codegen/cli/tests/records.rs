@@ -1,9 +1,10 @@
 //! An unusable record is refused with the line or time, the expectation, and a fix; nothing is written. Each is made from a good one,
 //! and tested both in a spec and with `identify`.
 
+use std::ffi::OsString;
 use std::fmt::Write as _;
 use std::fs;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 use crate::support::{Document, Folder, length};
 use serde_json::Value;
@@ -29,6 +30,17 @@ fn csv(rows: &[[f64; 3]]) -> String {
         writeln!(text, "{t},{u},{y}").unwrap();
         text
     })
+}
+
+/// A caller in the same process has arguments of its own.
+#[test]
+fn the_suggested_line_has_the_words_of_the_call() {
+    static STOP: AtomicBool = AtomicBool::new(false);
+    let folder = Folder::new();
+    let record = folder.path("records/leg1.csv").display().to_string();
+    let words = ["identify", &record, "--grid", "8"].map(OsString::from);
+    let document = specgen::cli::call(words, &STOP, |_| {}, None).to_string();
+    assert!(document.contains(&format!("`specgen identify --drive=0:100 {record} --grid 8`")), "{document}");
 }
 
 /// A folder with a spec for the bad record, with grid 8 because the good one has eight curves.

@@ -12,13 +12,13 @@ mod scan;
 use std::io::Read;
 
 use super::findings::Findings;
-use head::{decoded, has_fields, is_mark, split};
+use head::{has_fields, is_mark, split};
 use lines::LineReader;
 use names::Conversion;
 use specgen_language::diagnostic::{Code, codes};
 use specgen_language::interrupt;
 
-pub(crate) use head::Head;
+pub(crate) use head::{Head, decoded};
 pub(crate) use lines::LineNumbers;
 pub(crate) use scan::{Part, tables};
 
@@ -50,7 +50,7 @@ pub(crate) const RECORD: Format = Format {
 };
 
 /// Most samples; a few columns of this length take a gigabyte.
-const MAX_SAMPLES: usize = 1 << 25;
+pub(crate) const MAX_SAMPLES: usize = 1 << 25;
 
 /// A column that is read.
 #[derive(Debug, Clone, Copy)]
@@ -161,6 +161,60 @@ pub(crate) fn open_part<'a>(
     Some((head, lines))
 }
 
+/// Where the columns of a record come from.
+pub(crate) enum Content<'a> {
+    /// A table of a text.
+    Text(Box<dyn Read + 'a>, Part),
+    /// Names and values of equal length, and comments.
+    Arrays(Vec<(String, Vec<f64>)>, String),
+}
+
+/// Reads the columns of a record.
+pub(crate) type Reader<'a> = Box<dyn FnOnce(&[Column], &mut Findings) -> Samples + 'a>;
+
+impl<'a> Content<'a> {
+    /// Curves of a text, as in [`Part`].
+    pub(crate) fn curves(&self) -> usize {
+        if let Self::Text(_, part) = self { part.curves } else { 0 }
+    }
+
+    /// The names, and what reads the columns below them; `None` after the problem was reported.
+    pub(crate) fn open(self, findings: &mut Findings) -> Option<(Head, Reader<'a>)> {
+        match self {
+            Self::Text(text, part) => {
+                let (head, lines) = open_part(text, part, &RECORD, findings)?;
+                Some((head, Box::new(|wanted, findings| lines.read(wanted, findings))))
+            }
+            Self::Arrays(arrays, comment) => {
+                let head = Head::of_arrays(arrays.iter().map(|(name, _)| name.trim().to_owned()).collect());
+                Some((head, Box::new(move |wanted, findings| of_arrays(&arrays, &comment, wanted, findings))))
+            }
+        }
+    }
+}
+
+/// The columns `wanted` of arrays, with the line numbers that they have as CSV.
+fn of_arrays(arrays: &[(String, Vec<f64>)], comment: &str, wanted: &[Column], findings: &mut Findings) -> Samples {
+    let mut rows = arrays.first().map_or(0, |(_, values)| values.len());
+    if rows > MAX_SAMPLES {
+        rows = 0;
+        RECORD.report_too_many(None, findings);
+    }
+    let columns = wanted.iter().map(|Column { at, name, conversion }| {
+        let values = arrays[*at].1.iter().take(rows).enumerate();
+        let finite = values.map(|(row, value)| {
+            if !value.is_finite() {
+                return RECORD.report_not_finite(row + 2, name, &value.to_string(), findings);
+            }
+            conversion.apply(*value)
+        });
+        finite.collect()
+    });
+    let columns = columns.collect();
+    let simulated = comment.lines().any(|line| is_mark(format!("#{line}").as_bytes()));
+    Samples { lines: LineNumbers::consecutive(2, rows), columns, simulated }
+}
+
 const EMPTY: &str = "the first line must be the header `time_s,drive_V,displacement_um`";
 
 /// Reports an invalid byte `byte` at position `at` of its line.
@@ -190,9 +244,7 @@ impl Lines<'_> {
                 continue;
             }
             if lines.len() == MAX_SAMPLES {
-                let message = format!("has more than {MAX_SAMPLES} samples");
-                let help = "record at a lower rate, or keep every n-th sample";
-                findings.add(codes::RECORD_TOO_LARGE, Some(line), message, help);
+                self.format.report_too_many(Some(line), findings);
                 break;
             }
             lines.push(line);
@@ -238,7 +290,7 @@ impl Lines<'_> {
         }
         let text = decoded(field);
         match head::number(&text, self.separator) {
-            Some((value, _)) if !value.is_finite() => format.report_not_finite(line, name, &text, findings),
+            Some((value, _)) if !value.is_finite() => return format.report_not_finite(line, name, &text, findings),
             Some((value, sign)) => {
                 if sign.is_none() || *self.decimal.get_or_insert(sign.unwrap_or('.')) == sign.unwrap_or('.') {
                     return value;
@@ -258,10 +310,17 @@ impl Lines<'_> {
 }
 
 impl Format {
-    /// Reports NaN or infinity.
-    pub(crate) fn report_not_finite(&self, line: usize, name: &str, shown: &str, findings: &mut Findings) {
+    /// Reports NaN or infinity; returns NaN.
+    pub(crate) fn report_not_finite(&self, line: usize, name: &str, shown: &str, findings: &mut Findings) -> f64 {
         let (code, help) = self.not_finite;
         findings.add(code, Some(line), format!("`{name}` is `{shown}`, not a finite number"), help);
+        f64::NAN
+    }
+
+    fn report_too_many(&self, line: Option<usize>, findings: &mut Findings) {
+        let message = format!("has more than {MAX_SAMPLES} samples");
+        let help = "record at a lower rate, or keep every n-th sample";
+        findings.add(codes::RECORD_TOO_LARGE, line, message, help);
     }
 }
 

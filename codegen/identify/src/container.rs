@@ -1,8 +1,6 @@
-//! Records in files of MATLAB, HDF5, TDMS and NumPy: their arrays as columns of tables, which are then read as lines of
-//! text like any other file.
+//! Records in files of MATLAB, HDF5, TDMS and NumPy: their arrays as columns of tables.
 //!
-//! Arrays of one length are the columns of a table; a matrix gives one for each of its columns. Numbers are written so
-//! that they read back to the bit.
+//! Arrays of one length are the columns of a table; a matrix gives one for each of its columns.
 
 mod bytes;
 mod hdf5;
@@ -11,16 +9,14 @@ mod npy;
 mod tdms;
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::fmt::Write as _;
-use std::io::{self, Read};
 
 use super::columns::names::quantity;
 use super::tables::{Extent, listed};
-use bytes::MOST_ARRAYS;
 pub(crate) use bytes::{FARTHEST, Refusal, unpack};
+use bytes::{Form, INEXACT, MOST_ARRAYS};
 
 /// Names and values.
-type Columns = Vec<(String, Vec<f64>)>;
+pub(crate) type Columns = Vec<(String, Vec<f64>)>;
 
 /// An array of numbers.
 struct Array {
@@ -50,7 +46,7 @@ pub(crate) struct Tables {
     pub(crate) tables: Vec<Table>,
     /// Names, each with what it is.
     pub(crate) left_out: Vec<String>,
-    /// Comments for the lines of any of the tables.
+    /// Comments of any of the tables.
     pub(crate) comment: Option<String>,
 }
 
@@ -141,6 +137,14 @@ impl Kind {
 }
 
 impl Contents {
+    /// Adds an array whose numbers have this form in the file.
+    fn add(&mut self, array: Array, form: Form) {
+        if matches!(form, ('i' | 'u', 8)) && array.values.iter().any(|value| value.abs() >= INEXACT) {
+            self.others.push((array.name.clone(), "last digits of its integers from 2⁵³ on".to_owned()));
+        }
+        self.arrays.push(array);
+    }
+
     /// Whether more was found than is read.
     fn is_full(&self) -> bool {
         self.is_full || self.arrays.len() + self.others.len() > MOST_ARRAYS
@@ -262,44 +266,10 @@ impl Table {
         Extent { name: self.name.clone(), rows, columns, first_line: None }
     }
 
-    /// The lines of a text.
-    pub(crate) fn lines(self, comment: Option<String>) -> Lines {
-        // A separator or a quotation mark must not occur in a name, nor a name be a number.
-        let plain = |name: &str| match name.replace(['\t', '\n', '\r', '"'], " ") {
-            number if number.trim().parse::<f64>().is_ok() => format!("column {number}"),
-            name => name,
-        };
-        let names: Vec<String> = self.columns.iter().map(|(name, _)| plain(name)).collect();
-        let comment: String = comment.iter().flat_map(|text| text.lines()).map(|line| format!("# {line}\n")).collect();
-        let head = format!("{}\n{comment}", names.join("\t"));
-        Lines { columns: self.columns, next: 0, line: head.into_bytes(), taken: 0 }
-    }
-}
-
-/// Columns of equal length, line by line, names first.
-pub(crate) struct Lines {
-    columns: Columns,
-    next: usize,
-    line: Vec<u8>,
-    taken: usize,
-}
-
-impl Read for Lines {
-    fn read(&mut self, into: &mut [u8]) -> io::Result<usize> {
-        if self.taken == self.line.len() {
-            let mut text = String::new();
-            for (k, (_, values)) in self.columns.iter().enumerate() {
-                let Some(value) = values.get(self.next) else { return Ok(0) };
-                // Writing to a String cannot fail.
-                let _ = write!(text, "{}{value:?}", if k > 0 { "\t" } else { "" });
-            }
-            text.push('\n');
-            self.next += 1;
-            (self.line, self.taken) = (text.into_bytes(), 0);
-        }
-        let count = into.len().min(self.line.len() - self.taken);
-        into[..count].copy_from_slice(&self.line[self.taken..self.taken + count]);
-        self.taken += count;
-        Ok(count)
+    /// Its columns, with names that are no numbers.
+    pub(crate) fn columns(self) -> Columns {
+        let is_number = |name: &str| name.trim().parse::<f64>().is_ok();
+        let named = |name: String| if is_number(&name) { format!("column {name}") } else { name };
+        self.columns.into_iter().map(|(name, values)| (named(name), values)).collect()
     }
 }

@@ -8,32 +8,33 @@ use std::path::Path;
 
 use flate2::read::MultiGzDecoder;
 
-use super::columns::{self, Part, foreign, names};
-use super::container::{FARTHEST, Kind, Lines, Refusal, Table, unpack};
+use super::columns::{self, Content, MAX_SAMPLES, Part, foreign, names};
+use super::container::{Columns, FARTHEST, Kind, Refusal, Table, unpack};
 use super::findings::Findings;
 use super::reading::{MaxSize, Reading, shown_size};
 use super::tables::{self, Choice, Extent};
+use specgen_language::arrays;
 use specgen_language::diagnostic::{Diagnostic, codes};
 pub use specgen_language::files::MAX_BYTES as MAX_FILE_BYTES;
 use specgen_language::files::{self, ReadError};
 
-/// A text, and the table of it that is read.
+/// The table of a file that is read.
 pub(crate) struct Source<'a> {
-    pub(crate) lines: Box<dyn Read + 'a>,
-    pub(crate) part: Part,
+    pub(crate) content: Content<'a>,
     pub(crate) choice: Choice,
 }
 
 impl<'a> Source<'a> {
     /// A text that has one table.
+    #[cfg(test)]
     pub(crate) fn whole(lines: impl Read + 'a) -> Self {
-        Self { lines: Box::new(lines), part: Part::WHOLE, choice: Choice::default() }
+        Self { content: Content::Text(Box::new(lines), Part::WHOLE), choice: Choice::default() }
     }
 
     /// A text, and the table `series` of it, or else the longest; `None` after the problem was reported.
     pub(crate) fn of_text(text: &'a [u8], series: Option<&str>, findings: &mut Findings) -> Option<Self> {
-        let (part, choice) = part(text, series, findings)?;
-        Some(Self { lines: Box::new(text), part, choice })
+        let (part, choice, _) = part(text, series, findings)?;
+        Some(Self { content: Content::Text(Box::new(text), part), choice })
     }
 
     /// A table of a file in memory.
@@ -42,14 +43,21 @@ impl<'a> Source<'a> {
         let text = match unpacked(file, limit, findings)? {
             Unpacked::Text(text) => text,
             Unpacked::Tables(kind, file) => {
-                let (lines, choice) = table(kind, file, series, limit, findings)?;
-                return Some(Source { choice, ..Source::whole(lines) });
+                let (columns, comment, choice) = table(kind, file, series, limit, findings)?;
+                return Some(Source { content: Content::Arrays(columns, comment), choice });
             }
         };
-        let (part, choice) = part(&text[..], series, findings)?;
-        Some(Source { lines: Box::new(Cursor::new(text)), part, choice })
+        let (part, choice, rows) = part(&text[..], series, findings)?;
+        let numbers = (rows * QUANTITIES * size_of::<f64>()) as u64;
+        if numbers > limit.bytes {
+            return too_large("has numbers that take", Some(numbers), limit, findings);
+        }
+        Some(Source { content: Content::Text(Box::new(Cursor::new(text)), part), choice })
     }
 }
+
+/// Most columns of a text that are read.
+const QUANTITIES: usize = 4;
 
 /// The content of a file.
 enum Unpacked {
@@ -59,24 +67,26 @@ enum Unpacked {
     Tables(Kind, Vec<u8>),
 }
 
-/// The table of a text that is read.
-fn part(text: impl Read, series: Option<&str>, findings: &mut Findings) -> Option<(Part, Choice)> {
+/// The table of a text that is read, and its number of rows.
+fn part(text: impl Read, series: Option<&str>, findings: &mut Findings) -> Option<(Part, Choice, usize)> {
     let (parts, extents): (Vec<Part>, Vec<Extent>) = columns::tables(text).into_iter().unzip();
     // What has no table is refused when it is read.
     if parts.len() < 2 && series.is_none() {
-        return Some((parts.first().copied().unwrap_or(Part::WHOLE), Choice::default()));
+        let rows = extents.first().map_or(0, |extent| extent.rows);
+        return Some((parts.first().copied().unwrap_or(Part::WHOLE), Choice::default(), rows));
     }
-    tables::choose(&extents, is_record, &[], series, findings).map(|chosen| (parts[chosen.table], chosen))
+    tables::choose(&extents, is_record, &[], series, findings)
+        .map(|chosen| (parts[chosen.table], chosen, extents[chosen.table].rows))
 }
 
-/// The table of a binary file that is read.
+/// Columns and comments of the table of a binary file that is read.
 fn table(
     kind: Kind,
     file: Vec<u8>,
     series: Option<&str>,
     limit: MaxSize,
     findings: &mut Findings,
-) -> Option<(Lines, Choice)> {
+) -> Option<(Columns, String, Choice)> {
     let mut found = match kind.tables(file, limit.bytes) {
         Ok(found) => found,
         Err(Refusal::Large(size)) => return too_large("unpacked, is", size, limit, findings),
@@ -88,7 +98,7 @@ fn table(
     };
     let extents: Vec<Extent> = found.tables.iter().map(Table::extent).collect();
     let chosen = tables::choose(&extents, is_record, &found.left_out, series, findings)?;
-    Some((found.tables.swap_remove(chosen.table).lines(found.comment), chosen))
+    Some((found.tables.swap_remove(chosen.table).columns(), found.comment.unwrap_or_default(), chosen))
 }
 
 /// Whether a table has names of a record.
@@ -132,7 +142,10 @@ fn unpacked(mut file: Vec<u8>, limit: MaxSize, findings: &mut Findings) -> Optio
         }
         let unit = |pair: &[u8; 2]| if *a == 0xff { u16::from_le_bytes(*pair) } else { u16::from_be_bytes(*pair) };
         let text = char::decode_utf16(pairs.iter().map(unit)).map(|c| c.unwrap_or(char::REPLACEMENT_CHARACTER));
-        return Some(Unpacked::Text(text.collect::<String>().into_bytes()));
+        // At most three bytes each; growing it would take more.
+        let mut whole = String::with_capacity(3 * pairs.len());
+        whole.extend(text);
+        return Some(Unpacked::Text(whole.into_bytes()));
     }
     Some(Unpacked::Text(file))
 }
@@ -144,25 +157,43 @@ fn too_large<T>(what: &str, size: Option<u64>, limit: MaxSize, findings: &mut Fi
         Some(size) => format!("{what} {} in memory, more than {most}", shown_size(size)),
         None => format!("{what} more than {FARTHEST} times as large as {most}"),
     };
-    let mut help =
-        "save only time, drive and displacement, or every n-th sample; plain text may have any size".to_owned();
+    let mut help = format!("save only time, drive and displacement, or as plain text, up to {MAX_SAMPLES} samples");
     if let Some(size) = size.filter(|_| limit.is_option) {
         help = format!("give `--max-size {}` to `specgen identify`, or {help}", shown_size(size));
     }
     findings.refuse(codes::RECORD_TOO_LARGE, None, message, &help)
 }
 
-/// The text of a data file, record or table, without a byte order mark. A binary file of tables gives the text of one.
+/// The text of a data file, record or table, without a byte order mark. A binary file of tables gives one as CSV.
 ///
 /// # Errors
 /// A finding if it is not a regular file, cannot be read, is larger than [`MAX_FILE_BYTES`], or is not UTF-8.
 pub fn read_file(path: &Path, shown_as: &str) -> Result<String, Vec<Diagnostic>> {
-    let mut findings = Findings::new(shown_as);
-    read_text(path, &mut findings).ok_or_else(|| findings.into_diagnostics())
+    read_table(path, shown_as).map(|table| match table {
+        TextOrArrays::Text(text) => text,
+        TextOrArrays::Arrays(table) => table.csv(),
+    })
 }
 
-/// The text of the file without a byte order mark, or `None` after the reason was reported.
-fn read_text(path: &Path, findings: &mut Findings) -> Option<String> {
+/// A table as a file has it.
+pub enum TextOrArrays {
+    /// As text.
+    Text(String),
+    /// As arrays.
+    Arrays(arrays::Table),
+}
+
+/// The same as [`read_file`], without making text of arrays.
+///
+/// # Errors
+/// As [`read_file`].
+pub fn read_table(path: &Path, shown_as: &str) -> Result<TextOrArrays, Vec<Diagnostic>> {
+    let mut findings = Findings::new(shown_as);
+    read_content(path, &mut findings).ok_or_else(|| findings.into_diagnostics())
+}
+
+/// The table, or `None` after the reason was reported.
+fn read_content(path: &Path, findings: &mut Findings) -> Option<TextOrArrays> {
     let bytes = match files::open_file(path).and_then(|file| files::content(file, MAX_FILE_BYTES)) {
         Ok(bytes) => bytes,
         Err(ReadError::Large(limit)) => {
@@ -179,19 +210,14 @@ fn read_text(path: &Path, findings: &mut Findings) -> Option<String> {
     let bytes = match unpacked(bytes, limit, findings)? {
         Unpacked::Text(text) => text,
         Unpacked::Tables(kind, file) => {
-            let mut text = Vec::new();
-            let (lines, _) = table(kind, file, None, limit, findings)?;
+            let (columns, comment, _) = table(kind, file, None, limit, findings)?;
             if !findings.is_empty() {
                 let message = "has several tables, or parts that are no numbers".to_owned();
                 let help = "save one table as CSV, or the table that `specgen identify RECORD -o table.csv` makes";
                 return findings.refuse(codes::RECORD_HEADER, None, message, help);
             }
-            // Reading from memory cannot fail.
-            let _ = lines.take(MAX_FILE_BYTES + 1).read_to_end(&mut text);
-            if text.len() as u64 > MAX_FILE_BYTES {
-                return too_large("as text, is", Some(text.len() as u64), limit, findings);
-            }
-            text
+            let columns = columns.into_iter().map(|(name, values)| (name, arrays::Column::Numbers(values))).collect();
+            return Some(TextOrArrays::Arrays(arrays::Table { columns, comment }));
         }
     };
     let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&bytes);
@@ -205,7 +231,7 @@ fn read_text(path: &Path, findings: &mut Findings) -> Option<String> {
         let message = format!("is not a text file in UTF-8: byte {at} is 0x{:02x}", bytes[at]);
         return findings.refuse(codes::RECORD_NOT_TEXT, Some(line), message, "export the record as CSV text in UTF-8");
     }
-    Some(String::from_utf8_lossy(bytes).into_owned())
+    Some(TextOrArrays::Text(String::from_utf8_lossy(bytes).into_owned()))
 }
 
 /// The table `series` of a data file, or else the longest; `None` after the reason was reported.
@@ -229,9 +255,9 @@ pub(crate) fn open_file(path: &Path, reading: &Reading, findings: &mut Findings)
             }
         };
     }
-    let (part, choice) = part(&file, reading.series(), findings)?;
+    let (part, choice, _) = part(&file, reading.series(), findings)?;
     file.rewind().map_err(|error: io::Error| unreadable(&error.into(), findings)).ok()?;
-    Some(Source { lines: Box::new(file), part, choice })
+    Some(Source { content: Content::Text(Box::new(file), part), choice })
 }
 
 fn unreadable(unread: &ReadError, findings: &mut Findings) {

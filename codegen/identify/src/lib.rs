@@ -44,6 +44,9 @@ mod least_squares;
 pub mod leg_model;
 mod limits;
 pub mod linear;
+#[cfg(test)]
+#[path = "../../../tests/fuzz/targets/memory.rs"]
+mod memory;
 mod mixed;
 pub mod mode;
 mod normal;
@@ -80,7 +83,7 @@ pub use columns::{SIMULATED, is_simulated, marked_as_simulated};
 pub use coverage::Region;
 pub use estimate::{Estimate, Parameter};
 pub use export::{is_table_csv, read_table_csv, write_table_csv};
-pub use file::{MAX_FILE_BYTES, read_file};
+pub use file::{MAX_FILE_BYTES, TextOrArrays, read_file, read_table};
 pub use grid_choice::{GridChoice, Score, choose_grid};
 pub use joined::join;
 pub use leg_model::{read_leg_csv, write_leg_csv};

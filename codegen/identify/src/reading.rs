@@ -47,18 +47,18 @@ pub fn size(text: &str) -> Result<u64, String> {
         "TB" => 1000 * GB,
         _ => 0,
     };
-    let bytes = digits.parse::<u64>().ok().and_then(|number| number.checked_mul(unit)).filter(|bytes| *bytes > 0);
-    bytes.ok_or_else(|| "expected a size such as 500MB or 4GB".to_owned())
+    let bytes = digits.parse::<f64>().ok().map(|number| (number * unit as f64).ceil()).filter(|bytes| *bytes > 0.0);
+    bytes.map(|bytes| bytes as u64).ok_or_else(|| "expected a size such as 500MB or 4GB".to_owned())
 }
 
-/// The least such size that is not below `bytes`: below 1 MB in kB, up to 1 GB in MB.
+/// The least such size with three decimals that is not below `bytes`.
 pub(crate) fn shown_size(bytes: u64) -> String {
     let (unit, name) = match bytes {
         ..1_000_000 => (1000, "kB"),
-        1_000_000..=GB => (GB / 1000, "MB"),
+        1_000_000..GB => (GB / 1000, "MB"),
         _ => (GB, "GB"),
     };
-    format!("{}{name}", bytes.div_ceil(unit).max(1))
+    format!("{}{name}", bytes.div_ceil(unit / 1000) as f64 / 1000.0)
 }
 
 /// A column that the user names.
@@ -202,6 +202,24 @@ fn unknown(name: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn sizes_are_shown_so_that_they_suffice() {
+        for (bytes, shown) in [
+            (2 * GB, "2GB"),
+            (2 * GB + 1, "2.001GB"),
+            (GB, "1GB"),
+            (GB - 1, "1000MB"),
+            (16_384_000, "16.384MB"),
+            (20, "0.02kB"),
+        ] {
+            assert_eq!(shown_size(bytes), shown);
+            assert!(size(shown).unwrap() >= bytes && size(shown).unwrap() <= bytes + bytes / 1000 + 1, "{shown}");
+        }
+        for text in ["0GB", "-1GB", "GB", "nanGB", "4", "4GiB"] {
+            assert!(size(text).is_err(), "{text}");
+        }
+    }
 
     #[test]
     fn columns_are_named_with_their_units() {

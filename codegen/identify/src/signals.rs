@@ -4,7 +4,7 @@ mod places;
 
 use std::path::Path;
 
-use super::columns::{self, Column, Head, LineNumbers, RECORD, Samples, names};
+use super::columns::{Column, Head, LineNumbers, Samples, names};
 use super::file::{Source, open_file};
 use super::findings::Findings;
 use super::reading::Reading;
@@ -89,23 +89,23 @@ fn checked(source: Source, wanted: &[ColumnSpec], reading: &Reading, findings: &
 
 /// The `wanted` columns without any check of their values; `None` after every problem of the header was reported.
 pub(crate) fn columns_of(
-    Source { lines, part, choice }: Source,
+    Source { content, choice }: Source,
     wanted: &[ColumnSpec],
     reading: &Reading,
     findings: &mut Findings,
 ) -> Option<Signals> {
-    let (header, lines) = columns::open_part(lines, part, &RECORD, findings)?;
-    if wanted[0].name == TIME && part.curves >= CURVES && !has_time(&header, reading) {
+    let curves = content.curves();
+    let (header, read) = content.open(findings)?;
+    if wanted[0].name == TIME && curves >= CURVES && !has_time(&header, reading) {
         let message = format!(
-            "has {} curves between blank lines, each in one direction and without times, as magnetometers record FORC: the way back to each reversal was not recorded, so the drive between the curves is not known",
-            part.curves
+            "has {curves} curves between blank lines, each in one direction and without times, as magnetometers record FORC: the way back to each reversal was not recorded, so the drive between the curves is not known"
         );
         let help = "record time, drive and displacement without a break, on the ways back as well";
         return findings.refuse(codes::RECORD_GAP, None, message, help);
     }
     let places = places::find(&header, wanted, reading, findings)?;
     let there: Vec<Column> = places.columns.iter().flatten().copied().collect();
-    let Samples { lines, columns: values, simulated } = lines.read(&there, findings);
+    let Samples { lines, columns: values, simulated } = read(&there, findings);
     let mut values = values.into_iter();
     let mut columns: Vec<Option<Vec<f64>>> =
         places.columns.iter().map(|place| place.and_then(|_| values.next())).collect();

@@ -80,7 +80,8 @@ pub(crate) fn choose(
             None => Some(Choice { stretch: Some(number(series.trim())?), ..whole(0) }),
         };
         let numbered = || numbered().filter(|choice| choice.table < all.len());
-        return named.map(whole).or_else(numbered).or_else(|| {
+        // A note names stretches and tables by their numbers, so that a name which is a number comes second.
+        return numbered().or_else(|| named.map(whole)).or_else(|| {
             let message = format!("`--series` names `{series}`; the file has {}", listed(&words(None)));
             findings.refuse(codes::RECORD_HEADER, None, message, "name a table of the file by its name or number")
         });
@@ -122,7 +123,7 @@ mod tests {
             columns: vec!["a".to_owned()],
             first_line: Some(first_line),
         };
-        let all = [table("R, C", 3, 2), table("20 Hz", 500, 8), table("40 Hz", 500, 600)];
+        let all = [table("R, C", 3, 2), table("20 Hz", 500, 8), table("7", 500, 600)];
         let choose = |series: Option<&str>| {
             let mut findings = Findings::new("r.csv");
             let found = choose(&all, |_| false, &["`s` (a text)".to_owned()], series, &mut findings);
@@ -131,12 +132,19 @@ mod tests {
         };
         let (found, notes) = choose(None);
         assert_eq!((found, notes[0].code), (Some((1, None)), codes::RECORD_PART.id));
-        for word in ["table 2 `20 Hz` (500 rows of `a` from line 8)", "3 `40 Hz`", "left out: `s` (a text)"] {
+        for word in ["table 2 `20 Hz` (500 rows of `a` from line 8)", "3 `7`", "left out: `s` (a text)"] {
             assert!(notes[0].message.contains(word), "{}", notes[0].message);
         }
         assert_eq!(choose(Some("3")), (Some((2, None)), Vec::new()));
         assert_eq!(choose(Some("2.4")), (Some((1, Some(4))), Vec::new()));
-        assert_eq!(choose(Some("40 hz")), (Some((2, None)), Vec::new()));
+        // A table that is called as a number hides no other one, and no stretch.
+        assert_eq!(choose(Some("7")), (Some((2, None)), Vec::new()));
+        let single = [table("3", 500, 1)];
+        let of_single = |series| {
+            let found = super::choose(&single, |_| false, &[], Some(series), &mut Findings::new("r.csv")).unwrap();
+            (found.table, found.stretch)
+        };
+        assert_eq!([of_single("3"), of_single("2")], [(0, Some(3)), (0, Some(2))]);
         let (found, refused) = choose(Some("4"));
         assert!(
             found.is_none() && refused[0].code == codes::RECORD_HEADER.id && refused[0].message.contains("1 `R, C`"),

@@ -13,6 +13,7 @@ use std::os::unix::fs::{FileTypeExt, MetadataExt, OpenOptionsExt};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
+use crate::arrays::Form;
 use rustix::fs::{Access, OFlags, access, fcntl_setfl};
 
 /// Largest file whose content is kept in memory, bytes.
@@ -235,6 +236,8 @@ pub enum OutputError {
     Input(PathBuf),
     /// Another output of the same command has this name.
     Twice,
+    /// It has the suffix of a table as arrays, but no table; this name has none.
+    Arrays(PathBuf),
     /// It is write-protected.
     Protected,
     /// It is of a kind that cannot be an output.
@@ -252,6 +255,9 @@ impl fmt::Display for OutputError {
                 write!(f, "it is an input of this command, `{}`; name another file", name.display())
             }
             Self::Twice => f.write_str("another output of this command has the same name; name two files"),
+            Self::Arrays(name) => {
+                write!(f, "only tables are written as .npz and .mat; name another file, such as `{}`", name.display())
+            }
             Self::Protected => f.write_str("it is write-protected; name another file, or permit writing to this one"),
             Self::Kind("a folder") => f.write_str("it is a folder, name a file in it"),
             Self::Kind(kind) => write!(f, "it is {kind}; name a regular file"),
@@ -278,12 +284,20 @@ pub enum Destination {
     Device,
 }
 
-/// Checks whether a command may write this file: it is not one of its inputs, by device and inode, and its permissions
-/// allow it.
+/// Checks whether a command may write this file: it is not one of its inputs, by device and inode, its permissions allow
+/// it, and its suffix is not that of a table as arrays.
 ///
 /// # Errors
 /// Why not.
 pub fn guard(path: &Path) -> Result<Destination, OutputError> {
+    if Form::of(path).is_some() { Err(OutputError::Arrays(path.with_extension(""))) } else { guard_table(path) }
+}
+
+/// The same for a table, which may have any suffix.
+///
+/// # Errors
+/// As [`guard`].
+pub fn guard_table(path: &Path) -> Result<Destination, OutputError> {
     if let Some(name) = input(path) { Err(OutputError::Input(name)) } else { guard_edit(path) }
 }
 

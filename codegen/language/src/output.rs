@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use tempfile::NamedTempFile;
 
-use crate::arrays::Form;
+use crate::arrays::{Form, Table};
 use crate::files::{self, Destination, OutputError, ReadError};
 use crate::interrupt::{self, Guard, ResultFolders};
 use crate::lock;
@@ -34,6 +34,24 @@ pub fn write_file(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
     PendingFile::with(path, bytes)?.keep()
 }
 
+/// Writes a table: CSV, or the same as arrays if the name of the file asks for them.
+pub fn write_table(path: &Path, csv: &[u8]) -> Result<(), Failure> {
+    let mut file = TableFile::create(path)?;
+    file.write_all(csv).map_err(|error| unwritten(path, &error))?;
+    file.keep()
+}
+
+/// Writes a table of columns in the form that the name of the file asks for.
+pub fn write_columns(path: &Path, table: &Table) -> Result<(), Failure> {
+    let file = match Form::of(path) {
+        Some(form) => form.file(table).map_err(|why| unwritten(path, &why))?,
+        None => table.csv().into_bytes(),
+    };
+    let mut pending = PendingFile::of(path, files::guard_table)?;
+    pending.write_all(&file).map_err(|error| unwritten(path, &error))?;
+    pending.keep()
+}
+
 /// The same for an input, which the command is there to edit.
 pub fn edit_file(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
     let mut pending = PendingFile::of(path, files::guard_edit)?;
@@ -48,10 +66,19 @@ pub fn check_edit(path: &Path) -> Result<(), Failure> {
 
 /// Refuses a place where a file cannot be, before the minutes that its content takes.
 pub fn check_place(path: &Path) -> Result<(), Failure> {
-    match files::guard(path) {
+    check_permit(path, files::guard)
+}
+
+/// The same for a table.
+pub fn check_table(path: &Path) -> Result<(), Failure> {
+    check_permit(path, files::guard_table)
+}
+
+fn check_permit(path: &Path, guard: Permit) -> Result<(), Failure> {
+    match guard(path) {
         // A pipe would wait for its reader.
         Ok(Destination::Device) => Ok(()),
-        _ => PendingFile::create(path).map(|_| ()),
+        _ => PendingFile::of(path, guard).map(|_| ()),
     }
 }
 
@@ -93,19 +120,16 @@ pub fn unwritten(path: &Path, reason: &dyn std::fmt::Display) -> Failure {
 /// Says why a file may not be written. One that the command names twice is a mistake of its arguments.
 pub fn refused_output(path: &Path, why: &OutputError) -> Failure {
     match why {
-        OutputError::Input(_) | OutputError::Twice => {
+        OutputError::Input(_) | OutputError::Twice | OutputError::Arrays(_) => {
             Failure::Usage(format!("`{}` is not written: {why}; nothing was changed", path.display()))
         }
         _ => unwritten(path, why),
     }
 }
 
-/// A file that is written piece by piece: beside its place, and put there when it is whole ([`PendingFile::keep`]). A
-/// table in CSV becomes arrays if the name of the file asks for them ([`Form`]).
+/// A file that is written piece by piece: beside its place, and put there when it is whole ([`PendingFile::keep`]).
 pub struct PendingFile {
     place: Place,
-    /// Form of the arrays, and the table until it is whole.
-    table: Option<(Form, Vec<u8>)>,
     target: PathBuf,
     /// Whether it may be written.
     guard: Permit,
@@ -139,8 +163,7 @@ impl PendingFile {
             Destination::File(target) => target,
             Destination::Device => {
                 let file = files::open_device(path).map_err(|why| refused_output(path, &why))?;
-                let (place, target) = (Place::Device(file), path.to_owned());
-                return Ok(Self { place, table: table(path), target, guard });
+                return Ok(Self { place: Place::Device(file), target: path.to_owned(), guard });
             }
         };
         let folder = match target.parent() {
@@ -153,7 +176,7 @@ impl PendingFile {
         let (file, passing) = Guard::file(|| temporary_beside(&target, folder), |file| file.path().to_owned())
             .map_err(|error| unwritten(path, &plain(&error)))?;
         let place = Place::Beside { file, _guard: passing, _claimed: claimed };
-        Ok(Self { place, table: table(path), target, guard })
+        Ok(Self { place, target, guard })
     }
 
     /// A file that needs only to be kept.
@@ -169,12 +192,8 @@ impl PendingFile {
         self.put()
     }
 
-    fn put(mut self) -> Result<(), Failure> {
-        if let Some((form, csv)) = self.table.take() {
-            let arrays = form.of_csv(&csv).map_err(|why| unwritten(&self.target, &why))?;
-            self.write_all(&arrays).map_err(|error| unwritten(&self.target, &error))?;
-        }
-        let Self { place, target, guard, .. } = self;
+    fn put(self) -> Result<(), Failure> {
+        let Self { place, target, guard } = self;
         match place {
             Place::Device(_) => Ok(()),
             Place::Beside { file, _guard, _claimed } => {
@@ -197,9 +216,6 @@ impl PendingFile {
 
 impl Write for PendingFile {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        if let Some((_, csv)) = &mut self.table {
-            return csv.write(bytes);
-        }
         match &mut self.place {
             // The file below: the name that it has meanwhile is of no use in an error.
             Place::Beside { file, .. } => file.as_file_mut().write(bytes),
@@ -215,9 +231,41 @@ impl Write for PendingFile {
     }
 }
 
-/// The beginning of a table for a file of arrays.
-fn table(path: &Path) -> Option<(Form, Vec<u8>)> {
-    Form::of(path).map(|form| (form, Vec::new()))
+/// A table that is written as CSV, row by row. It becomes arrays if the name of the file asks for them.
+pub struct TableFile {
+    file: PendingFile,
+    /// Form of the arrays, and the table until it is whole.
+    arrays: Option<(Form, Vec<u8>)>,
+}
+
+impl TableFile {
+    /// As [`PendingFile::create`].
+    ///
+    /// # Errors
+    /// The file may not be written, or not made.
+    pub fn create(path: &Path) -> Result<Self, Failure> {
+        let file = PendingFile::of(path, files::guard_table)?;
+        Ok(Self { file, arrays: Form::of(path).map(|form| (form, Vec::new())) })
+    }
+
+    /// The table is whole.
+    pub fn keep(mut self) -> Result<(), Failure> {
+        if let Some((form, csv)) = self.arrays.take() {
+            let arrays = form.of_csv(&csv).map_err(|why| unwritten(&self.file.target, &why))?;
+            self.file.write_all(&arrays).map_err(|error| unwritten(&self.file.target, &error))?;
+        }
+        self.file.keep()
+    }
+}
+
+impl Write for TableFile {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        if let Some((_, csv)) = &mut self.arrays { csv.write(bytes) } else { self.file.write(bytes) }
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.file.flush()
+    }
 }
 
 /// What the system says, without the name of a temporary file, which is of no use to a reader.

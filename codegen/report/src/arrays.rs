@@ -3,9 +3,9 @@
 use std::path::Path;
 
 use serde::Serialize;
-use specgen_identify::read_file;
+use specgen_identify::{TextOrArrays, read_table};
 use specgen_language::outcome::{Failure, Outcome};
-use specgen_language::output::write_file;
+use specgen_language::output::{write_columns, write_table};
 use specgen_language::ui::Ui;
 
 use crate::drawing::wrote;
@@ -28,11 +28,10 @@ impl Outcome for Written {
 /// # Errors
 /// The file cannot be read or has no table, or the output cannot be written.
 pub fn run(table: &Path, output: &Path, ui: &mut Ui) -> Result<(), Failure> {
-    let text = read_file(table, &table.display().to_string()).map_err(refused)?;
-    // Tabs separate the columns of arrays.
-    let is_plain = !text.contains(',');
-    let text = if is_plain { text.replace('\t', ",") } else { text };
-    write_file(output, text.as_bytes())?;
+    match read_table(table, &table.display().to_string()).map_err(refused)? {
+        TextOrArrays::Text(csv) => write_table(output, csv.as_bytes())?,
+        TextOrArrays::Arrays(columns) => write_columns(output, &columns)?,
+    }
     ui.result(&Written { file: output.display().to_string() });
     Ok(())
 }

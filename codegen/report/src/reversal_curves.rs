@@ -7,7 +7,7 @@ use host_sim::forc::ReversalRecord;
 use serde::Serialize;
 use specgen_language::arrays::Form;
 use specgen_language::outcome::{Failure, Outcome};
-use specgen_language::output::{unwritten, write_file};
+use specgen_language::output::{unwritten, write_table};
 
 use crate::chart::{Axis, Chart, LINE};
 use crate::drawing::Plot;
@@ -78,7 +78,7 @@ impl Curves {
         }
         let mut written = Vec::new();
         for (text, path) in texts.iter().zip(paths) {
-            write_file(&path, text.as_bytes())?;
+            write_table(&path, text.as_bytes())?;
             let rows = text.lines().count() - heads;
             written.push(Self { rows, file: path.display().to_string(), further: Vec::new(), plot: None });
         }

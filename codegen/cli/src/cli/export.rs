@@ -6,7 +6,7 @@ use specgen_language::ui::Ui;
 use specgen_report::arrays;
 use specgen_studies::export;
 
-use super::path_roles::{InputFile, OutputFile, OutputFolder};
+use super::path_roles::{InputFile, OutputFolder, TableFile};
 
 /// Arguments of `export`.
 #[derive(Args, Debug)]
@@ -62,7 +62,7 @@ struct TableArguments {
     table: InputFile,
     /// The new file, with an array for each column.
     #[arg(short, long, value_name = "FILE")]
-    output: OutputFile,
+    output: TableFile,
 }
 
 pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {

@@ -9,7 +9,7 @@ use specgen_studies::reversal_curves::Experiment;
 
 use super::identify::range;
 use super::number::number;
-use super::path_roles::{InputFile, OutputFile};
+use super::path_roles::{InputFile, TableFile};
 use super::plot::Plot;
 use super::sim::PlantArguments;
 
@@ -22,7 +22,7 @@ pub struct Arguments {
     spec: Option<InputFile>,
     /// Output file: CSV with time_s, drive_V, displacement_um; no displacement with --drive-only.
     #[arg(short, long, value_name = "FILE")]
-    output: OutputFile,
+    output: TableFile,
     /// Number of reversal curves, and of cells per axis of the grid to identify; that of the spec, or 32, if not given.
     #[arg(long, allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(2..=256))]
     grid: Option<u32>,

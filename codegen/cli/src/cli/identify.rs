@@ -8,12 +8,12 @@ use specgen_identify::mode::Mode;
 use specgen_identify::{DeadTime, Reading, size};
 use specgen_language::model::LegModelKind;
 use specgen_language::outcome::Failure;
-use specgen_language::output::check_place;
+use specgen_language::output::check_table;
 use specgen_language::ui::Ui;
 use specgen_report::identify::{Bench, estimates, everett, gains, linear, predict, rate, refit};
 
 use super::number::number;
-use super::path_roles::{InputFile, OutputFile, OutputFileOrFolder, OutputFolder};
+use super::path_roles::{InputFile, OutputFileOrFolder, OutputFolder, TableFile};
 use super::plot::Plot;
 
 /// Arguments of `identify`.
@@ -119,7 +119,7 @@ struct ResponseArguments {
     /// Write the response to this file, a table (see `specgen export table`): frequency_Hz, real_um_per_V,
     /// imaginary_um_per_V, coherence.
     #[arg(short, long, value_name = "FILE")]
-    output: Option<OutputFile>,
+    output: Option<TableFile>,
     #[command(flatten)]
     bench: BenchArguments,
 }
@@ -149,7 +149,7 @@ struct GaugeArguments {
     degree: Option<u8>,
     /// Write the calibration table to this file, for other programs (CSV: gauge_V, reference_um, means over even steps).
     #[arg(long, value_name = "FILE")]
-    table: Option<OutputFile>,
+    table: Option<TableFile>,
     #[command(flatten)]
     bench: BenchArguments,
 }
@@ -177,7 +177,7 @@ struct PredictArguments {
     mode: Option<ModeArgument>,
     /// Write time_s, drive_V, displacement_um (predicted) and, if measured, measured_um and error_um to this file.
     #[arg(short, long, value_name = "FILE")]
-    output: Option<OutputFile>,
+    output: Option<TableFile>,
     #[command(flatten)]
     bench: BenchArguments,
 }
@@ -296,7 +296,8 @@ fn mode(text: &str) -> Result<ModeArgument, String> {
     }
 }
 
-pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
+/// `words` are those of the command line.
+pub fn run(arguments: &Arguments, words: &[String], ui: &mut Ui) -> Result<(), Failure> {
     match &arguments.kind {
         Some(Kind::Linear(LinearArguments { records, frequency, reference, spec, bench })) => {
             linear::run(records, frequency, *reference, spec.as_deref(), &bench.bench()?, ui)
@@ -327,12 +328,12 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
         Some(Kind::Rate(RateArguments { records, drive, grid, hold_out, output, bench })) => {
             rate::run(records, *drive, *grid, hold_out.as_deref(), output.as_deref(), &bench.bench()?, ui)
         }
-        None => record(&arguments.everett, ui),
+        None => record(&arguments.everett, words, ui),
     }
 }
 
 /// A record without a command: a recorded run, or reversal curves.
-fn record(arguments: &EverettArguments, ui: &mut Ui) -> Result<(), Failure> {
+fn record(arguments: &EverettArguments, words: &[String], ui: &mut Ui) -> Result<(), Failure> {
     let EverettArguments { records, drive, spec, grid, dead_time, model, validate, output, bench } = arguments;
     let usage = |text: &str| Err(Failure::Usage(text.to_owned()));
     if let Some(spec) = spec {
@@ -352,10 +353,10 @@ fn record(arguments: &EverettArguments, ui: &mut Ui) -> Result<(), Failure> {
         return usage("expected a record: see `specgen identify --help`");
     }
     // A folder in its place is for a recorded run only.
-    output.as_deref().map_or(Ok(()), check_place)?;
+    output.as_deref().map_or(Ok(()), check_table)?;
     let Some(drive) = drive else {
-        let given: Vec<String> = std::env::args().skip_while(|word| word != "identify").skip(1).collect();
-        return Err(everett::missing_range(records, &bench.bench()?, &given, ui));
+        let given = words.iter().position(|word| word == "identify").map_or(words, |at| &words[at + 1..]);
+        return Err(everett::missing_range(records, &bench.bench()?, given, ui));
     };
     let dead_time = dead_time.map_or(DeadTime::Estimate, |ms| DeadTime::Fixed(ms * 1e-3));
     let options = everett::Options { drive: *drive, grid: *grid, dead_time, model: *model };

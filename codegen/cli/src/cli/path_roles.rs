@@ -58,7 +58,9 @@ path_types! {
     InputFile
     /// A file that the command writes.
     OutputFile
-    /// A file that the command writes, or a folder that it writes files into.
+    /// A table that the command writes, as CSV or as arrays.
+    TableFile
+    /// A table that the command writes, or a folder that it writes files into.
     OutputFileOrFolder
     /// A folder that the command writes files into, or a prefix of their names.
     OutputFolder
@@ -66,14 +68,17 @@ path_types! {
     Endpoint
 }
 
+/// Check of an output.
+type Guard = fn(&Path) -> Result<Destination, OutputError>;
+
 /// Refuses outputs that would replace an input or another output, and outputs that cannot be written, before anything is read.
 pub fn check(matches: &ArgMatches) -> Result<(), Failure> {
     let (mut inputs, mut outputs) = (Vec::new(), Vec::new());
     collect(matches, &mut inputs, &mut outputs);
     inputs.iter().for_each(|path| files::note_input(path));
     let mut seen = BTreeSet::new();
-    for path in &outputs {
-        let way = files::guard(path).map_err(|why| refused_output(path, &why))?;
+    for (path, guard) in &outputs {
+        let way = guard(path).map_err(|why| refused_output(path, &why))?;
         let Destination::File(target) = way else { continue };
         if !seen.insert(whole(&target)) {
             return Err(refused_output(path, &OutputError::Twice));
@@ -89,16 +94,19 @@ fn whole(target: &Path) -> PathBuf {
     folder.zip(absolute.file_name()).map_or(absolute.clone(), |(folder, name)| folder.join(name))
 }
 
-fn collect(matches: &ArgMatches, inputs: &mut Vec<PathBuf>, outputs: &mut Vec<PathBuf>) {
+fn collect(matches: &ArgMatches, inputs: &mut Vec<PathBuf>, outputs: &mut Vec<(PathBuf, Guard)>) {
     for id in matches.ids().map(clap::Id::as_str) {
         if let Ok(Some(found)) = matches.try_get_many::<InputFile>(id) {
             inputs.extend(found.map(|one| one.0.clone()));
         }
         if let Ok(Some(found)) = matches.try_get_many::<OutputFile>(id) {
-            outputs.extend(found.map(|one| one.0.clone()));
+            outputs.extend(found.map(|one| (one.0.clone(), files::guard as Guard)));
+        }
+        if let Ok(Some(found)) = matches.try_get_many::<TableFile>(id) {
+            outputs.extend(found.map(|one| (one.0.clone(), files::guard_table as Guard)));
         }
         if let Ok(Some(found)) = matches.try_get_many::<OutputFileOrFolder>(id) {
-            outputs.extend(found.filter(|one| !one.0.is_dir()).map(|one| one.0.clone()));
+            outputs.extend(found.filter(|one| !one.0.is_dir()).map(|one| (one.0.clone(), files::guard_table as Guard)));
         }
     }
     if let Some((_, below)) = matches.subcommand() {
@@ -113,6 +121,7 @@ pub fn role(argument: &clap::Arg) -> Option<Role> {
     let roles = [
         (ValueParser::from(InputFile::value_parser()), Role::Input),
         (ValueParser::from(OutputFile::value_parser()), Role::Output),
+        (ValueParser::from(TableFile::value_parser()), Role::Output),
         (ValueParser::from(OutputFileOrFolder::value_parser()), Role::Output),
         (ValueParser::from(OutputFolder::value_parser()), Role::Folder),
         (ValueParser::from(Endpoint::value_parser()), Role::Endpoint),

@@ -5,7 +5,7 @@ use specgen_language::outcome::Failure;
 use specgen_language::ui::Ui;
 use specgen_report::replay;
 
-use super::path_roles::{InputFile, OutputFile};
+use super::path_roles::{InputFile, OutputFile, TableFile};
 use super::plot::Plot;
 
 /// Arguments of `replay`.
@@ -19,7 +19,7 @@ pub struct Arguments {
     spec: Option<InputFile>,
     /// Export the recording as CSV, with time and units; with --spec also voltages and, for a platform, pose, target and error.
     #[arg(long, value_name = "FILE")]
-    csv: Option<OutputFile>,
+    csv: Option<TableFile>,
     /// Export the recording as MCAP, with one JSON channel and schema per signal: gauges, codes, status, phase, settings; with
     /// --spec also the signals of --csv.
     #[arg(long, value_name = "FILE")]

@@ -122,6 +122,11 @@ impl Head {
         Self { names: Vec::new(), line, interval: None, filled: Vec::new(), next: 0, separator }
     }
 
+    /// Of arrays with these names.
+    pub(crate) fn of_arrays(names: Vec<String>) -> Self {
+        Self { filled: (0..names.len()).collect(), names, ..Self::without_names(1, b',') }
+    }
+
     /// Finds the columns that have numbers in the first of the `lines` of samples.
     pub(super) fn find_filled(&mut self, lines: &[Line]) {
         let Some((_, row)) = lines.iter().find(|(_, line)| has_fields(line)) else { return };
@@ -186,7 +191,7 @@ fn clean(field: &[u8]) -> &[u8] {
 }
 
 /// Text of a line with names: UTF-8, or else Latin-1, in which many instruments write their µ.
-pub(super) fn decoded(bytes: &[u8]) -> String {
+pub(crate) fn decoded(bytes: &[u8]) -> String {
     match std::str::from_utf8(bytes) {
         Ok(text) => text.to_owned(),
         Err(_) => bytes.iter().map(|byte| char::from(*byte)).collect(),

@@ -8,6 +8,13 @@ pub(super) const DAMAGED: &str = "it is damaged or cut off";
 /// Most arrays of a file, with its texts and whatever else has a name.
 pub(super) const MOST_ARRAYS: usize = 10_000;
 
+/// Longest name, and longest text that is kept, bytes.
+pub(super) const LONGEST_NAME: usize = 256;
+pub(super) const LONGEST_TEXT: usize = 1 << 20;
+
+/// Most dimensions of an array.
+pub(super) const MOST_DIMENSIONS: usize = 32;
+
 /// Reason why a file is not read.
 #[derive(Debug)]
 pub(crate) enum Refusal {
@@ -43,21 +50,36 @@ pub(crate) fn unpack(
     farthest: u64,
     into: &mut Vec<u8>,
 ) -> io::Result<Option<u64>> {
-    let kept = (&mut unpacked).take(limit).read_to_end(into)? as u64;
+    let before = into.len();
+    let mut block = [0; 1 << 12];
+    let mut first = (&mut unpacked).take(limit);
+    loop {
+        let count = first.read(&mut block)?;
+        if count == 0 {
+            break;
+        }
+        if into.capacity() - into.len() < count {
+            // By a quarter: what grows is there twice while it is copied.
+            into.reserve_exact(count + into.len() / 4);
+        }
+        into.extend_from_slice(&block[..count]);
+    }
+    let kept = (into.len() - before) as u64;
     let left = farthest.saturating_sub(kept);
     let more = io::copy(&mut unpacked.take(left.saturating_add(1)), &mut io::sink())?;
     Ok((more <= left).then_some(kept + more))
 }
 
-/// Space for numbers, which are counted before they are stored.
+/// Space for numbers and for parts of structs, which are counted before they are stored.
 pub(crate) struct Space {
     limit: u64,
     used: u64,
+    parts: usize,
 }
 
 impl Space {
     pub(crate) fn new(limit: u64) -> Self {
-        Self { limit, used: 0 }
+        Self { limit, used: 0, parts: MOST_ARRAYS }
     }
 
     /// Whether there is space for more numbers.
@@ -66,11 +88,24 @@ impl Space {
         self.used <= self.limit
     }
 
+    /// Takes the space for parts of a struct: names of fields, or values. Takes none if there is not enough.
+    pub(super) fn take_parts(&mut self, count: usize) -> bool {
+        let left = self.parts.checked_sub(count);
+        self.parts = left.unwrap_or(self.parts);
+        left.is_some()
+    }
+
     /// An error if there was not enough.
     pub(super) fn check(&self) -> Result<(), Refusal> {
         if self.used > self.limit { Err(Refusal::Large(Some(self.used))) } else { Ok(()) }
     }
 }
+
+/// Form of numbers: integers with (`i`) or without (`u`) sign, or floating point (`f`), of a number of bytes each.
+pub(super) type Form = (char, usize);
+
+/// From here on a number need not be the integer that it was read from: 2⁵³.
+pub(super) const INEXACT: f64 = 9_007_199_254_740_992.0;
 
 /// The rest of a file or of a part of it.
 #[derive(Clone, Copy)]
@@ -103,15 +138,20 @@ impl<'a> Bytes<'a> {
         usize::try_from(u64::from_le_bytes(self.array()?)).map_err(|_| DAMAGED.to_owned())
     }
 
-    /// The rest as numbers: integers with (`i`) or without (`u`) sign, or floating point (`f`), of a number of bytes
-    /// each.
-    pub(super) fn numbers(self, form: (char, usize)) -> Vec<f64> {
+    /// The rest as numbers of this form.
+    pub(super) fn numbers(self, form: Form) -> Vec<f64> {
+        let mut values = Vec::new();
+        self.append_numbers(form, &mut values);
+        values
+    }
+
+    /// Appends the rest as numbers of this form.
+    pub(super) fn append_numbers(self, form: Form, into: &mut Vec<f64>) {
         macro_rules! numbers {
             ($type:ty) => {{
                 let (values, _) = self.rest.as_chunks();
                 let read = if self.is_big_endian { <$type>::from_be_bytes } else { <$type>::from_le_bytes };
-                // 64-bit counters; above 2⁵³ they are not exact.
-                values.iter().map(|value| read(*value) as f64).collect()
+                into.extend(values.iter().map(|value| read(*value) as f64));
             }};
         }
         match form {
@@ -125,7 +165,7 @@ impl<'a> Bytes<'a> {
             ('u', 8) => numbers!(u64),
             ('f', 4) => numbers!(f32),
             ('f', 8) => numbers!(f64),
-            _ => Vec::new(),
+            _ => {}
         }
     }
 }

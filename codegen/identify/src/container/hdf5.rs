@@ -2,7 +2,7 @@
 
 use hdf5_pure::{AttrValue, DType, Dataset, Error, File, Group};
 
-use super::bytes::{MOST_ARRAYS, Refusal, Space};
+use super::bytes::{LONGEST_NAME, MOST_ARRAYS, Refusal, Space};
 use super::{Array, Contents};
 
 /// Classes of MATLAB that have no numbers, though they are stored as numbers.
@@ -12,6 +12,9 @@ const DEEPEST: usize = 4;
 const MOST_GROUPS: usize = 1000;
 /// Most bytes that deflate unpacks from one. A dataset that is larger than all of the file can hold was never written.
 const MOST_PER_BYTE: usize = 1032;
+
+/// Memory for the place of a chunk, in numbers.
+const NUMBERS_PER_CHUNK: usize = 32;
 
 /// What may still be read: groups, numbers, and the largest dataset, bytes.
 struct Left {
@@ -40,7 +43,12 @@ fn add(group: &Group, path: &str, depth: usize, left: &mut Left, contents: &mut 
     }
     for (name, data) in datasets {
         match numbers(&data, left) {
-            Some((size, values)) => contents.arrays.push(Array { group: path.to_owned(), name, size, values }),
+            _ if is_long(&name, contents) => {}
+            Some((size, values)) => {
+                let is_wide = matches!(data.dtype(), Ok(DType::I64 | DType::U64));
+                let form = (if is_wide { 'i' } else { 'f' }, 8);
+                contents.add(Array { group: path.to_owned(), name, size, values }, form);
+            }
             None => contents.others.push((name, "no array of numbers that can be read".to_owned())),
         }
     }
@@ -48,6 +56,9 @@ fn add(group: &Group, path: &str, depth: usize, left: &mut Left, contents: &mut 
     for (name, group) in group.iter_groups()?.filter(|(name, _)| !name.starts_with('#')) {
         if contents.is_full() {
             break;
+        }
+        if is_long(&name, contents) {
+            continue;
         }
         if depth == DEEPEST || left.groups == 0 {
             contents.others.push((name, "a group".to_owned()));
@@ -61,6 +72,16 @@ fn add(group: &Group, path: &str, depth: usize, left: &mut Left, contents: &mut 
         }
     }
     Ok(())
+}
+
+/// Whether a name is too long; it is then left out.
+fn is_long(name: &str, contents: &mut Contents) -> bool {
+    let is_long = name.len() > LONGEST_NAME;
+    if is_long {
+        let begin = name.chars().take(20).collect::<String>() + "…";
+        contents.others.push((begin, format!("a name of more than {LONGEST_NAME} bytes")));
+    }
+    is_long
 }
 
 /// Size and values of an array of numbers; none for texts and tables, or beyond what is `left` to read.
@@ -81,12 +102,15 @@ fn numbers(data: &Dataset, left: &mut Left) -> Option<(Vec<usize>, Vec<f64>)> {
     }
     // A chunk is unpacked as a whole.
     let chunk = data.chunk_shape().ok()?.unwrap_or_default();
+    let lengths = data.shape().ok()?.into_iter().zip(&chunk);
+    let chunks = lengths.fold(1_u64, |count, (all, own)| count.saturating_mul(all.div_ceil((*own).max(1))));
     let chunk = chunk.into_iter().try_fold(1, |count, length| usize::try_from(length).ok()?.checked_mul(count))?;
     let most = if count > chunk { count } else { chunk };
     if most.checked_mul(usize::try_from(data.element_size().ok()?).ok()?)? > left.largest {
         return None;
     }
-    if !left.space.has(most) {
+    let listed = usize::try_from(chunks).ok()?.saturating_mul(NUMBERS_PER_CHUNK);
+    if !left.space.has(most.saturating_add(listed)) {
         // Counted only.
         return Some((size, Vec::new()));
     }

@@ -7,8 +7,11 @@ use std::ops::RangeInclusive;
 
 use flate2::read::ZlibDecoder;
 
-use super::bytes::{Bytes, DAMAGED, FARTHEST, MOST_ARRAYS, Refusal, Space, unpack};
+use super::bytes::{
+    Bytes, DAMAGED, FARTHEST, Form, LONGEST_NAME, LONGEST_TEXT, MOST_DIMENSIONS, Refusal, Space, unpack,
+};
 use super::{Array, Contents};
+use crate::columns::decoded;
 use specgen_language::arrays::COMMENT;
 
 /// Name of a time in s.
@@ -27,15 +30,13 @@ const STRUCT: u8 = 2;
 const TEXT: u8 = 4;
 /// Objects of classes: texts in double quotes, time series, tables.
 const OPAQUE: u8 = 17;
-/// Most dimensions of an array.
-const MOST_DIMENSIONS: usize = 32;
 /// Levels of structs that are read.
 const DEEPEST: usize = 6;
 
 /// A variable, or a field of a struct.
 enum Value {
-    /// Size and values; whether there are imaginary parts, too.
-    Numbers(Vec<usize>, Vec<f64>, bool),
+    /// Size, values and their form in the file; whether there are imaginary parts, too.
+    Numbers(Vec<usize>, Vec<f64>, Form, bool),
     Text(String),
     /// Names of the fields, and the values of the fields of each struct in turn.
     Structs(Vec<String>, Vec<Self>),
@@ -60,8 +61,8 @@ fn element<'a>(from: &mut Bytes<'a>) -> Result<(u32, &'a [u8]), String> {
     Ok((kind, bytes))
 }
 
-/// The values of the next element.
-fn numbers(from: &mut Bytes) -> Result<Vec<f64>, String> {
+/// The values of the next element, which may have `most`, and their form.
+fn numbers(from: &mut Bytes, most: usize) -> Result<(Vec<f64>, Form), String> {
     let (kind, rest) = element(from)?;
     let form = match kind {
         1 => ('i', 1),
@@ -76,70 +77,59 @@ fn numbers(from: &mut Bytes) -> Result<Vec<f64>, String> {
         13 => ('u', 8),
         _ => return Err(DAMAGED.to_owned()),
     };
-    Ok(Bytes { rest, ..*from }.numbers(form))
+    if rest.len() / form.1 > most {
+        return Err(DAMAGED.to_owned());
+    }
+    Ok((Bytes { rest, ..*from }.numbers(form), form))
 }
 
-/// The text of the next element, in bytes or in units of UTF-16.
-fn text(from: &mut Bytes) -> Result<String, String> {
+/// The next element as a name.
+fn name(from: &mut Bytes) -> Result<String, String> {
+    text(from, LONGEST_NAME)?.ok_or_else(|| format!("it has a name of more than {LONGEST_NAME} bytes"))
+}
+
+/// The text of the next element, in bytes or in units of UTF-16; none if it has more than `most` bytes.
+fn text(from: &mut Bytes, most: usize) -> Result<Option<String>, String> {
     let (kind, rest) = element(from)?;
+    if rest.len() > most {
+        return Ok(None);
+    }
     if !matches!(kind, 4 | 17) {
-        return Ok(String::from_utf8_lossy(rest).trim_end_matches('\0').to_owned());
+        return Ok(Some(decoded(rest).trim_end_matches('\0').to_owned()));
     }
     let read = if from.is_big_endian { u16::from_be_bytes } else { u16::from_le_bytes };
     let units = rest.as_chunks().0.iter().map(|unit| read(*unit));
-    Ok(char::decode_utf16(units).map(|letter| letter.unwrap_or(char::REPLACEMENT_CHARACTER)).collect())
+    Ok(Some(char::decode_utf16(units).map(|letter| letter.unwrap_or(char::REPLACEMENT_CHARACTER)).collect()))
 }
 
 /// Name and value of an array with these parts.
 fn variable(mut parts: Bytes, depth: usize, space: &mut Space) -> Result<(String, Value), String> {
     if parts.rest.is_empty() {
-        return Ok((String::new(), Value::Numbers(Vec::new(), Vec::new(), false)));
+        return Ok((String::new(), Value::Numbers(Vec::new(), Vec::new(), ('f', 8), false)));
     }
     let (_, flags) = element(&mut parts)?;
     let class = *flags.get(if parts.is_big_endian { 3 } else { 0 }).ok_or(DAMAGED)?;
     let is_complex = flags.get(if parts.is_big_endian { 2 } else { 1 }).is_some_and(|flags| flags & COMPLEX > 0);
     if class == OPAQUE {
-        let [name, _system, class] = [text(&mut parts)?, text(&mut parts)?, text(&mut parts)?];
+        let [name, _system, class] = [name(&mut parts)?, name(&mut parts)?, name(&mut parts)?];
         return Ok((name, Value::Other(format!("an object of class {class}"))));
     }
     // Lengths are integers.
-    let lengths = numbers(&mut parts)?;
-    if lengths.len() > MOST_DIMENSIONS {
-        return Err(DAMAGED.to_owned());
-    }
-    let size: Vec<usize> = lengths.into_iter().map(|length| length as usize).collect();
+    let size: Vec<usize> = numbers(&mut parts, MOST_DIMENSIONS)?.0.into_iter().map(|length| length as usize).collect();
     let count = size.iter().try_fold(1_usize, |count, length| count.checked_mul(*length)).ok_or(DAMAGED)?;
-    let name = text(&mut parts)?;
+    let name = name(&mut parts)?;
     let value = match class {
         // For complex numbers, the real part.
         class if NUMBERS.contains(&class) && !space.has(count) => Value::Other(String::new()),
         class if NUMBERS.contains(&class) => {
-            let values = numbers(&mut parts)?;
+            let (values, form) = numbers(&mut parts, count)?;
             if count != values.len() {
                 return Err(DAMAGED.to_owned());
             }
-            Value::Numbers(size, values, is_complex)
+            Value::Numbers(size, values, form, is_complex)
         }
-        TEXT => Value::Text(text(&mut parts)?),
-        STRUCT if depth < DEEPEST => {
-            let longest = numbers(&mut parts)?.first().map_or(0, |length| *length as usize);
-            let (_, names) = element(&mut parts)?;
-            let field = |name: &[u8]| {
-                let end = name.iter().position(|byte| *byte == 0).unwrap_or(name.len());
-                String::from_utf8_lossy(&name[..end]).into_owned()
-            };
-            let fields: Vec<String> = names.chunks_exact(longest.max(1)).map(field).collect();
-            let count = count.checked_mul(fields.len()).ok_or(DAMAGED)?;
-            if count > MOST_ARRAYS {
-                return Ok((name, Value::Other(format!("a struct of {count} values"))));
-            }
-            let mut values = Vec::new();
-            for _ in 0..count {
-                let (_, rest) = element(&mut parts)?;
-                values.push(variable(Bytes { rest, ..parts }, depth + 1, space)?.1);
-            }
-            Value::Structs(fields, values)
-        }
+        TEXT => text(&mut parts, LONGEST_TEXT)?.map_or_else(|| Value::Other("a long text".to_owned()), Value::Text),
+        STRUCT if depth < DEEPEST => return structs(parts, count, depth, space).map(|value| (name, value)),
         STRUCT => Value::Other("a struct".to_owned()),
         1 => Value::Other("a cell array".to_owned()),
         5 => Value::Other("a sparse matrix".to_owned()),
@@ -148,16 +138,37 @@ fn variable(mut parts: Bytes, depth: usize, space: &mut Space) -> Result<(String
     Ok((name, value))
 }
 
+/// `count` structs of these parts.
+fn structs(mut parts: Bytes, count: usize, depth: usize, space: &mut Space) -> Result<Value, String> {
+    let longest = numbers(&mut parts, 1)?.0.first().map_or(0, |length| *length as usize);
+    let (_, names) = element(&mut parts)?;
+    if longest > LONGEST_NAME {
+        return Err(DAMAGED.to_owned());
+    }
+    let names = names.chunks_exact(longest.max(1));
+    let count = count.checked_mul(names.len()).ok_or(DAMAGED)?;
+    if !space.take_parts(names.len().saturating_add(count)) {
+        return Ok(Value::Other(format!("a struct of {count} values")));
+    }
+    let fields = names.map(|name| decoded(name.split(|byte| *byte == 0).next().unwrap_or(name))).collect();
+    let mut values = Vec::with_capacity(count);
+    for _ in 0..count {
+        let (_, rest) = element(&mut parts)?;
+        values.push(variable(Bytes { rest, ..parts }, depth + 1, space)?.1);
+    }
+    Ok(Value::Structs(fields, values))
+}
+
 /// Adds the arrays of `value`, called `name` in `group`.
 fn add(group: &str, name: &str, value: Value, contents: &mut Contents) {
     match value {
         // Written after the variables, with the content of their objects.
         Value::Numbers(..) if name.is_empty() => {}
-        Value::Numbers(size, values, is_complex) => {
+        Value::Numbers(size, values, form, is_complex) => {
             if is_complex {
                 contents.others.push((name.to_owned(), "its imaginary part".to_owned()));
             }
-            contents.arrays.push(Array { group: group.to_owned(), name: name.to_owned(), size, values });
+            contents.add(Array { group: group.to_owned(), name: name.to_owned(), size, values }, form);
         }
         Value::Text(_) if !group.is_empty() => {}
         Value::Text(text) if name == COMMENT => contents.comment = Some(text),
@@ -177,7 +188,7 @@ fn add_structs(group: &str, name: &str, fields: &[String], values: Vec<Value>, c
             Value::Text(text) if matches!(field.as_str(), "Name" | "label") => Some(text.trim()),
             _ => None,
         });
-        let title = title.filter(|title| !title.is_empty());
+        let title = title.filter(|title| !title.is_empty() && title.len() <= LONGEST_NAME);
         let is_time = !group.is_empty() && name == "X" && title.is_none_or(|title| title.eq_ignore_ascii_case("time"));
         let title = if is_time { Some(TIME) } else { title }.map(str::to_owned);
         let element = if count > 1 { format!("{name}({number})") } else { name.to_owned() };

@@ -1,18 +1,23 @@
 //! Arrays of NumPy (NEP 1): a header that describes them, then their values.
 
-use super::bytes::{Bytes, DAMAGED, FARTHEST, Refusal, Space, unpack};
+use super::bytes::{
+    Bytes, DAMAGED, FARTHEST, Form, LONGEST_NAME, LONGEST_TEXT, MOST_ARRAYS, MOST_DIMENSIONS, Refusal, Space, unpack,
+};
 use super::{Array, Contents};
+use crate::columns::decoded;
 use flate2::read::DeflateDecoder;
 use rawzip::{CompressionMethod, ZipArchive};
 use specgen_language::arrays::COMMENT;
 
 /// Bytes of magic and version.
 const VERSION: usize = 8;
+/// Longest header, bytes: one of version 1 is shorter than 64 KiB.
+const LONGEST_HEADER: usize = 1 << 20;
 
 /// A field of a record: its name, format and place.
 struct Field {
     name: String,
-    form: (char, usize),
+    form: Form,
     is_big_endian: bool,
 }
 
@@ -34,7 +39,10 @@ fn array(file: &[u8], space: &mut Space) -> Result<Contents, String> {
     } else {
         rest.word()? as usize
     };
-    let header = String::from_utf8_lossy(rest.take(length)?).into_owned();
+    if length > LONGEST_HEADER {
+        return Err(format!("its header has {length} bytes, more than {LONGEST_HEADER}"));
+    }
+    let header = decoded(rest.take(length)?);
     let (shape, _) = value(&header, "shape")?.trim_start_matches('(').split_once(')').ok_or(DAMAGED)?;
     // Python 2 wrote 1000L.
     let lengths =
@@ -42,6 +50,9 @@ fn array(file: &[u8], space: &mut Space) -> Result<Contents, String> {
     let shape = lengths.map(|length| length.parse().map_err(|_| DAMAGED)).collect::<Result<Vec<usize>, _>>()?;
     let fields = fields(value(&header, "descr")?)?;
     let in_columns = value(&header, "fortran_order")?.starts_with("True");
+    if shape.len() > MOST_DIMENSIONS || fields.len() > MOST_ARRAYS {
+        return Err(format!("it has {} dimensions and {} fields", shape.len(), fields.len()));
+    }
     let count = shape.iter().try_fold(1_usize, |count, length| count.checked_mul(*length)).ok_or(DAMAGED)?;
     let width = fields
         .iter()
@@ -73,10 +84,10 @@ fn array(file: &[u8], space: &mut Space) -> Result<Contents, String> {
                 if !in_columns {
                     size.reverse();
                 }
-                contents.arrays.push(Array { group: String::new(), name, size, values });
+                contents.add(Array { group: String::new(), name, size, values }, form);
             }
             kind => {
-                if kind == 'U' && shape.is_empty() {
+                if kind == 'U' && shape.is_empty() && own.len() <= LONGEST_TEXT {
                     let letters = Bytes { rest: own, is_big_endian }.numbers(('u', 4));
                     contents.comment = Some(letters.into_iter().filter_map(|c| char::from_u32(c as u32)).collect());
                 }
@@ -104,18 +115,25 @@ pub(super) fn of_archive(file: &[u8], limit: u64) -> Result<Contents, Refusal> {
             break;
         }
         let entry = entry.map_err(|_| DAMAGED)?;
-        let path = String::from_utf8_lossy(entry.file_path().as_ref()).into_owned();
+        let path = decoded(entry.file_path().as_ref());
+        if path.len() > LONGEST_NAME {
+            return Err(format!("it has a name of more than {LONGEST_NAME} bytes").into());
+        }
         let Some(name) = path.strip_suffix(".npy") else { continue };
         let method = entry.compression_method();
-        let data = archive.get_entry(entry.wayfinder()).map_err(|_| DAMAGED)?.data();
+        let damaged = |_| format!("its `{path}` is damaged");
+        let packed = archive.get_entry(entry.wayfinder()).map_err(|_| DAMAGED)?;
+        let data = packed.data();
         let (left, farthest) = (limit.saturating_sub(unpacked), limit.saturating_mul(FARTHEST) - unpacked);
         let mut bytes = Vec::new();
         let there = match method {
-            CompressionMethod::STORE => unpack(data, left, farthest, &mut bytes),
-            CompressionMethod::DEFLATE => unpack(DeflateDecoder::new(data), left, farthest, &mut bytes),
+            CompressionMethod::STORE => unpack(packed.verifying_reader(data), left, farthest, &mut bytes),
+            CompressionMethod::DEFLATE => {
+                unpack(packed.verifying_reader(DeflateDecoder::new(data)), left, farthest, &mut bytes)
+            }
             _ => return Err("it is packed in an unusual way: write it with numpy.savez".into()),
         };
-        unpacked += there.map_err(|_| DAMAGED)?.ok_or(Refusal::Large(None))?;
+        unpacked += there.map_err(damaged)?.ok_or(Refusal::Large(None))?;
         if unpacked > limit {
             // Counted only.
             continue;
@@ -216,5 +234,28 @@ mod tests {
         for bad in ["{'descr': '<c16', 'shape': (2,)}", "{'descr': [('a', '<f8', (3,))], 'shape': (2,)}", "{}"] {
             assert!(contents(&file(bad, &[0; 99]), u64::MAX).is_err(), "{bad}");
         }
+    }
+
+    #[test]
+    fn headers_are_limited() {
+        let dimensions = format!("{{'descr': '<f8', 'fortran_order': False, 'shape': ({})}}", "1,".repeat(33));
+        let found = contents(&file(&dimensions, &[0; 8]), u64::MAX).map(|_| ());
+        assert!(matches!(found, Err(Refusal::Because(why)) if why.contains("33 dimensions")));
+        let long = [b"\x93NUMPY\x02\0", &(2_u32 << 20).to_le_bytes()[..], &vec![b' '; 2 << 20]].concat();
+        let found = contents(&long, u64::MAX).map(|_| ());
+        assert!(matches!(found, Err(Refusal::Because(why)) if why.contains("2097152 bytes")));
+    }
+
+    #[test]
+    fn integers_that_are_rounded_are_named() {
+        let read = |value: i64| {
+            let header = "{'descr': '<i8', 'fortran_order': False, 'shape': (1,), }";
+            let found = contents(&file(header, &value.to_le_bytes()), u64::MAX).unwrap();
+            (found.arrays[0].values[0], found.others)
+        };
+        let most = 1 << 53;
+        assert_eq!(read(most - 1), (9_007_199_254_740_991.0, Vec::new()));
+        let (value, others) = read(-most - 1);
+        assert!(value == -9_007_199_254_740_992.0 && others[0].1.contains("last digits"), "{others:?}");
     }
 }

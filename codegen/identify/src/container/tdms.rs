@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 
 use super::bytes::{Bytes, DAMAGED, MOST_ARRAYS, Refusal, Space};
 use super::{Array, Contents};
+use crate::columns::decoded;
 
 /// What a segment has.
 const OBJECTS: u32 = 1 << 1;
@@ -15,81 +16,71 @@ const INTERLEAVED: u32 = 1 << 5;
 const BIG_ENDIAN: u32 = 1 << 6;
 /// A type of variable length.
 const TEXT: u32 = 0x20;
+/// Longest path of a channel, bytes.
+const LONGEST_PATH: usize = 1024;
 
 /// A channel, a group, or the file.
-struct Object {
-    path: String,
+struct Object<'a> {
+    path: &'a [u8],
     kind: u32,
     /// Bytes of all its values in a chunk.
     size: usize,
     values: Vec<f64>,
-    /// Its key in [`Objects::listed`].
-    listed: Option<u64>,
+    /// Its place among the objects with values, from [`Objects::first`] on.
+    order: Option<u64>,
 }
 
-/// The objects of a file.
+/// The objects of a file. A segment costs time for its changes and values, not for objects without either.
 #[derive(Default)]
-struct Objects {
-    all: Vec<Object>,
+struct Objects<'a> {
+    all: Vec<Object<'a>>,
     /// Indices by path.
-    places: BTreeMap<String, usize>,
+    places: BTreeMap<&'a [u8], usize>,
     /// Indices of the objects with values, in their order.
     listed: BTreeMap<u64, usize>,
-    /// Next key in `listed`.
+    /// Orders of the present list: the first, and the next one.
+    first: u64,
     next: u64,
+    /// Bytes of a chunk, and of a value of each object in it.
+    chunk: usize,
+    row: usize,
 }
 
-impl Objects {
+impl<'a> Objects<'a> {
     /// Index of the object with this path, a new one if there is none.
-    fn place(&mut self, path: String) -> usize {
-        let place = *self.places.entry(path.clone()).or_insert(self.all.len());
+    fn place(&mut self, path: &'a [u8]) -> usize {
+        let place = *self.places.entry(path).or_insert(self.all.len());
         if place == self.all.len() {
-            self.all.push(Object { path, kind: TEXT, size: 0, values: Vec::new(), listed: None });
+            self.all.push(Object { path, kind: TEXT, size: 0, values: Vec::new(), order: None });
         }
         place
     }
 
-    fn list(&mut self, place: usize) {
-        if self.all[place].listed.is_none() {
-            self.listed.insert(self.next, place);
-            self.all[place].listed = Some(self.next);
-            self.next += 1;
+    /// Takes an object from the list, or changes its layout there. It keeps its order as long as it is given.
+    fn list(&mut self, place: usize, layout: Option<(u32, usize)>) -> Result<(), String> {
+        let object = &mut self.all[place];
+        let order = object.order.filter(|order| *order >= self.first);
+        if order.is_some_and(|order| self.listed.remove(&order).is_some()) {
+            self.chunk -= object.size;
+            self.row -= width(object.kind)?;
         }
-    }
-
-    fn unlist(&mut self, place: usize) {
-        if let Some(key) = self.all[place].listed.take() {
-            self.listed.remove(&key);
+        object.order = None;
+        let Some((kind, size)) = layout else { return Ok(()) };
+        let order = order.unwrap_or(self.next);
+        self.next += u64::from(order == self.next);
+        (object.kind, object.size, object.order) = (kind, size, Some(order));
+        if size > 0 {
+            self.listed.insert(order, place);
+            self.chunk = self.chunk.checked_add(size).ok_or(DAMAGED)?;
+            self.row += width(kind)?;
         }
+        Ok(())
     }
 
     fn unlist_all(&mut self) {
-        for place in std::mem::take(&mut self.listed).into_values() {
-            self.all[place].listed = None;
-        }
+        self.listed.clear();
+        (self.first, self.chunk, self.row) = (self.next, 0, 0);
     }
-
-    /// Those with bytes in each chunk, with the bytes of all of them and of a value of each.
-    fn in_chunk(&self) -> Result<Chunk, String> {
-        let mut chunk = Chunk::default();
-        for place in self.listed.values() {
-            let Object { size, kind, .. } = self.all[*place];
-            if size > 0 {
-                chunk.places.push(*place);
-                chunk.size = chunk.size.checked_add(size).ok_or(DAMAGED)?;
-                chunk.row += width(kind)?;
-            }
-        }
-        Ok(chunk)
-    }
-}
-
-/// Layout of a chunk.
-#[derive(Default)]
-struct Chunk {
-    places: Vec<usize>,
-    size: usize,
-    row: usize,
 }
 
 /// Flags, of a byte each, and times.
@@ -117,40 +108,41 @@ fn form(kind: u32) -> Option<(char, usize)> {
     })
 }
 
-fn text(from: &mut Bytes) -> Result<String, String> {
+fn text<'a>(from: &mut Bytes<'a>) -> Result<&'a [u8], String> {
     let length = from.word()? as usize;
-    Ok(String::from_utf8_lossy(from.take(length)?).into_owned())
+    from.take(length)
 }
 
 /// Reads the changes of `objects`.
-fn read_objects(mut from: Bytes, objects: &mut Objects) -> Result<(), String> {
+fn read_objects<'a>(mut from: Bytes<'a>, objects: &mut Objects<'a>) -> Result<(), String> {
     for _ in 0..from.word()? {
-        let place = objects.place(text(&mut from)?);
+        let path = text(&mut from)?;
+        if path.len() > LONGEST_PATH {
+            return Err(format!("it has a channel whose path is longer than {LONGEST_PATH} bytes"));
+        }
+        let place = objects.place(path);
         if place > MOST_ARRAYS {
             return Err(format!("it has more than {MOST_ARRAYS} channels and groups"));
         }
-        match from.word()? {
-            u32::MAX => objects.unlist(place),
-            given => {
-                let object = &mut objects.all[place];
-                // Zero: as it was.
-                if given > 0 {
-                    let kind = from.word()?;
-                    object.kind = kind;
-                    let (_, count) = (from.word()?, from.count()?);
-                    let size = if kind == TEXT { Some(from.count()?) } else { count.checked_mul(width(kind)?) };
-                    object.size = size.ok_or(DAMAGED)?;
-                }
-                objects.list(place);
+        let layout = match from.word()? {
+            u32::MAX => None,
+            // As it was.
+            0 => Some((objects.all[place].kind, objects.all[place].size)),
+            _ => {
+                let kind = from.word()?;
+                let (_, count) = (from.word()?, from.count()?);
+                let size = if kind == TEXT { Some(from.count()?) } else { count.checked_mul(width(kind)?) };
+                Some((kind, size.ok_or(DAMAGED)?))
             }
-        }
+        };
+        objects.list(place, layout)?;
         // Properties: a name, a type, a value.
         for _ in 0..from.word()? {
             let name = text(&mut from)?;
             match from.word()? {
                 TEXT => {
                     let value = text(&mut from)?;
-                    if name == "NI_Scaling_Status" && value == "unscaled" {
+                    if name == b"NI_Scaling_Status" && value == b"unscaled" {
                         return Err("its channels are raw numbers of the acquisition: save them scaled".to_owned());
                     }
                 }
@@ -163,12 +155,40 @@ fn read_objects(mut from: Bytes, objects: &mut Objects) -> Result<(), String> {
     Ok(())
 }
 
+impl Objects<'_> {
+    /// Adds the values of a chunk, or of its first rows if it is interleaved.
+    fn add(&mut self, chunk: Bytes, is_interleaved: bool, space: &mut Space) -> Result<(), String> {
+        let mut at = 0;
+        for place in self.listed.values() {
+            let Object { kind, size, values, .. } = &mut self.all[*place];
+            let own = if is_interleaved { width(*kind)? } else { *size };
+            let from = at;
+            at += own;
+            let Some(form) = form(*kind) else { continue };
+            if !is_interleaved {
+                if space.has(own / form.1) {
+                    let rest = chunk.rest.get(from..at).ok_or(DAMAGED)?;
+                    Bytes { rest, ..chunk }.append_numbers(form, values);
+                }
+                continue;
+            }
+            let rows = chunk.rest.chunks_exact(self.row);
+            if space.has(rows.len()) {
+                let bytes: Vec<u8> = rows.flat_map(|row| &row[from..from + own]).copied().collect();
+                Bytes { rest: &bytes, ..chunk }.append_numbers(form, values);
+            }
+        }
+        Ok(())
+    }
+}
+
 /// The channels of a file.
 pub(super) fn contents(file: &[u8], limit: u64) -> Result<Contents, Refusal> {
     let (mut objects, mut space) = (Objects::default(), Space::new(limit));
-    let mut chunk = Chunk::default();
     let mut file = Bytes { rest: file, is_big_endian: false };
     let mut is_interrupted = false;
+    // Bytes of chunks that are cut off.
+    let mut cut = 0;
     while !file.rest.is_empty() {
         if file.take(4)? != b"TDSm" {
             return Err(DAMAGED.into());
@@ -183,32 +203,24 @@ pub(super) fn contents(file: &[u8], limit: u64) -> Result<Contents, Refusal> {
         let (rest, values) = segment.split_at_checked(before_values).ok_or(DAMAGED)?;
         if has & OBJECTS_ALL_NEW > 0 {
             objects.unlist_all();
-            chunk = Chunk::default();
         }
         if has & OBJECTS > 0 {
             read_objects(Bytes { rest, ..file }, &mut objects)?;
-            chunk = objects.in_chunk()?;
         }
-        if has & VALUES == 0 || chunk.size == 0 {
+        if has & VALUES == 0 || objects.chunk == 0 {
             continue;
         }
-        let is_interleaved = has & INTERLEAVED > 0;
-        for values in values.chunks_exact(chunk.size) {
-            let mut at = 0;
-            for place in &chunk.places {
-                let object = &mut objects.all[*place];
-                let own = if is_interleaved { width(object.kind)? } else { object.size };
-                let step = if is_interleaved { chunk.row } else { chunk.size };
-                let rows = values.chunks_exact(step.max(1));
-                let from = at;
-                at += own;
-                let Some(form) = form(object.kind) else { continue };
-                if !space.has(rows.len() * (own / form.1)) {
-                    continue;
-                }
-                let bytes: Vec<u8> = rows.flat_map(|row| row.get(from..from + own)).flatten().copied().collect();
-                object.values.extend(Bytes { rest: &bytes, ..file }.numbers(form));
-            }
+        let is_interleaved = has & INTERLEAVED > 0 && objects.row > 0;
+        let whole = if is_interleaved { objects.row } else { objects.chunk };
+        let chunks = values.chunks_exact(whole);
+        cut += chunks.remainder().len();
+        if is_interleaved {
+            let rest = &values[..values.len() - chunks.remainder().len()];
+            objects.add(Bytes { rest, ..file }, true, &mut space)?;
+            continue;
+        }
+        for rest in chunks {
+            objects.add(Bytes { rest, ..file }, false, &mut space)?;
         }
     }
     space.check()?;
@@ -216,13 +228,17 @@ pub(super) fn contents(file: &[u8], limit: u64) -> Result<Contents, Refusal> {
     if is_interrupted {
         contents.others.push(("end of the file".to_owned(), "its writer was interrupted there".to_owned()));
     }
+    if cut > 0 {
+        contents.others.push(("last values".to_owned(), format!("{cut} bytes without those of the other channels")));
+    }
     for Object { path, kind, values, .. } in objects.all {
         // The path of a channel is `/'group'/'channel'`, with quotes in names doubled.
+        let path = decoded(path);
         let Some((group, name)) = path.rsplit_once("'/'") else { continue };
         let plain = |name: &str| name.trim_start_matches("/'").trim_end_matches('\'').replace("''", "'");
         let (group, name) = (plain(group), plain(name));
         match form(kind) {
-            Some(_) => contents.arrays.push(Array { group, name, size: vec![values.len()], values }),
+            Some(form) => contents.add(Array { group, name, size: vec![values.len()], values }, form),
             None => contents.others.push((name, "no array of numbers".to_owned())),
         }
     }
@@ -267,6 +283,34 @@ mod tests {
         assert!(read("unscaled").unwrap_err().contains("save them scaled"));
     }
 
+    /// A minute, if each segment looked at all channels.
+    #[test]
+    fn segments_take_time_for_their_own_changes() {
+        let word = |value: u32| value.to_le_bytes();
+        let segment = |objects: &[u8], values: &[u8]| {
+            let lengths = [(objects.len() + values.len()) as u64, objects.len() as u64].map(u64::to_le_bytes).concat();
+            let has = OBJECTS | if values.is_empty() { 0 } else { VALUES };
+            [b"TDSm", &word(has)[..], &word(4713), &lengths, objects, values].concat()
+        };
+        let channel = |name: u32, count: u64| {
+            let path = format!("/'g'/'{name}'");
+            let layout = [&word(20)[..], &word(1), &word(1), &count.to_le_bytes(), &word(0)].concat();
+            [&word(path.len() as u32)[..], path.as_bytes(), &layout].concat()
+        };
+        // Listed, all but one without values.
+        let channels: Vec<u8> = (0..9_000).flat_map(|name| channel(name, u64::from(name == 0))).collect();
+        let many = segment(&[&word(9_000)[..], &channels].concat(), &[7]);
+        let again = [segment(&word(0), &[]), segment(&word(0), &[8])].concat();
+        let begun = std::time::Instant::now();
+        let found = contents(&[many, again.repeat(400_000)].concat(), u64::MAX).unwrap();
+        let (first, second) = (&found.arrays[0].values, &found.arrays[1].values);
+        assert!(first.len() == 400_001 && first[400_000] == 8.0 && second.is_empty());
+        assert!(begun.elapsed().as_secs() < 10, "{:?}", begun.elapsed());
+        let long = [&word(1)[..], &word(2000), &[b'a'; 2000], &[0; 8]].concat();
+        let found = contents(&segment(&long, &[]), u64::MAX).map(|_| ()).unwrap_err();
+        assert!(matches!(found, Refusal::Because(why) if why.contains("longer than 1024 bytes")));
+    }
+
     #[test]
     fn chunks_and_interleaved_values_of_both_orders_of_bytes_are_put_together() {
         let (mut plain, mut mixed) = (Vec::new(), Vec::new());
@@ -285,8 +329,14 @@ mod tests {
         ];
         let expected = [0.0, 1.0, 2.0, 3.0, 0.0, 1.0, 0.0, 1.0, 2.0, 3.0].to_vec();
         let wanted = ["a", "it's b"].map(|name| ("scan".to_owned(), name.to_owned(), expected.clone()));
-        let found = contents(&file.concat(), u64::MAX).unwrap().arrays.into_iter();
+        let found = contents(&file.concat(), u64::MAX).unwrap();
+        assert!(found.others.iter().any(|(name, what)| name == "last values" && what.starts_with("6 bytes")));
+        let found = found.arrays.into_iter();
         assert_eq!(found.map(|array| (array.group, array.name, array.values)).collect::<Vec<_>>(), wanted);
+        // Interleaved rows need no whole chunk.
+        let found = contents(&segment(new | INTERLEAVED | BIG_ENDIAN, &mixed[..40]), u64::MAX).unwrap();
+        assert_eq!(found.arrays[1].values, [0.0, 1.0, 2.0]);
+        assert!(found.others[0].1.starts_with("4 bytes"), "{:?}", found.others);
         let mut other = file.concat();
         other.pop();
         assert!(contents(&other, u64::MAX).is_err());

@@ -187,8 +187,10 @@ impl Search<'_> {
     /// How `--columns` names a column: by its header, unless that has a letter with a meaning there or in a message.
     fn word(&self, at: usize) -> String {
         let names = &self.header.names;
-        let is_plain =
-            |name: &&String| !name.is_empty() && !name.contains(['=', '`', '\'', '\n']) && self.at(name) == Some(at);
+        let is_plain = |name: &&String| {
+            let is_trimmed = !name.is_empty() && name.trim() == name.as_str();
+            is_trimmed && !name.contains(['=', '`', '\'', '\n']) && self.at(name) == Some(at)
+        };
         names.get(at).filter(is_plain).cloned().unwrap_or_else(|| (at + 1).to_string())
     }
 
@@ -261,6 +263,7 @@ mod tests {
             ("tme_s,U,y\n0,1,2\n", "`--columns time_s=tme_s,drive_V=U,displacement_um=y`"),
             ("Time,s;Ch 1,V;Ch2,V\n0;1;2\n", "`--columns 'drive_V=Ch 1,V,displacement_um=Ch2,V'`"),
             (",0,1,2\n", "`--columns time_s=2,drive_V=3,displacement_um=4`"),
+            ("\u{a0}a;U;y\n0;1;2\n", "`--columns time_s=1,drive_V=U,displacement_um=y`"),
             (";a;a;x=1\n7;1;2;3\n", "`--columns time_s=1,drive_V=a,displacement_um=3`"),
             ("a,b\n1,2\n", "`--columns drive_V=a,displacement_um=b --rate HZ`"),
             ("sample,a,b\n0,1,2\n", "`--columns drive_V=a,displacement_um=b --rate HZ`"),

@@ -21,7 +21,7 @@ use crate::session::{POLL_INTERVAL, Session};
 use specgen_language::files;
 use specgen_language::model::Model;
 use specgen_language::outcome::{Failure, Outcome};
-use specgen_language::output::{check_input, check_place, write_file};
+use specgen_language::output::{check_input, check_place, check_table, write_file};
 use specgen_language::ui::Ui;
 
 /// Timeout of a ramp-down.
@@ -218,7 +218,7 @@ impl<P: Port> Operator<P> {
             }
             Command::Watch { file: Some(path), .. } => {
                 self.motion().map_err(nonsense)?;
-                check_place(path)
+                check_table(path)
             }
             Command::Download(path) => check_place(path),
             _ => Ok(()),

@@ -13,7 +13,7 @@ use specgen_link::client::{ClientError, Port};
 use super::error::SessionError;
 use super::operator::Operator;
 use specgen_language::outcome::Outcome;
-use specgen_language::output::{PendingFile, unwritten};
+use specgen_language::output::{TableFile, unwritten};
 use specgen_language::table::{Column, right, row};
 use specgen_language::ui::Ui;
 
@@ -78,14 +78,14 @@ impl Outcome for WatchReport {
 enum Sink {
     Shown,
     Kept,
-    File { file: Box<BufWriter<PendingFile>>, path: PathBuf, as_json: bool },
+    File { file: Box<BufWriter<TableFile>>, path: PathBuf, as_json: bool },
 }
 
 impl Sink {
     fn new(path: Option<&Path>, ui: &Ui) -> Result<Self, SessionError> {
         let Some(path) = path else { return Ok(if ui.is_json() { Self::Kept } else { Self::Shown }) };
         let as_json = path.extension().is_some_and(|extension| extension == "jsonl");
-        let mut file = Box::new(BufWriter::new(PendingFile::create(path).map_err(SessionError::Failed)?));
+        let mut file = Box::new(BufWriter::new(TableFile::create(path).map_err(SessionError::Failed)?));
         if !as_json {
             writeln!(file, "{}", titles()).map_err(|error| SessionError::Failed(unwritten(path, &error)))?;
         }

@@ -13,7 +13,7 @@ use specgen_identify::response::{FrequencyResponse, respond};
 use specgen_identify::stiffness::{AxialStiffness, measure};
 use specgen_identify::{Estimate, Input, Parameter, marked_as_simulated};
 use specgen_language::outcome::{Failure, Outcome};
-use specgen_language::output::{check_place, write_file};
+use specgen_language::output::{check_table, write_table};
 use specgen_language::ui::Ui;
 
 /// Shows what was estimated from a record, which measures `keys` of a spec, and draws its `figure`.
@@ -74,14 +74,14 @@ pub fn response(
     bench: &Bench,
     ui: &mut Ui,
 ) -> Result<(), Failure> {
-    output.map_or(Ok(()), check_place)?;
+    output.map_or(Ok(()), check_table)?;
     let shown = record.display().to_string();
     let report = respond(Input::File(record, &bench.reading), &shown, segment).map_err(refused)?;
     let keys = ["actuator.resonance", "actuator.damping_ratio", "amplifier.lag"];
     if let Some(path) = output {
         let text = bins(&report.value);
         let text = if report.simulated { marked_as_simulated(&text) } else { text };
-        write_file(path, text.as_bytes())?;
+        write_table(path, text.as_bytes())?;
         ui.progress(wrote(path).trim_end());
     }
     show(report, &keys, ("Frequency response", figure::response), bench, ui)
@@ -159,7 +159,7 @@ pub fn gauge(
             let _ = writeln!(rows, "{v:?},{:?}", y * 1e6);
             rows
         });
-        write_file(path, rows.as_bytes())?;
+        write_table(path, rows.as_bytes())?;
         files += &wrote(path);
     }
     files.extend(bench.plot.write("Gauge calibration", || figure::gauge(&report))?);

@@ -15,7 +15,7 @@ use super::{Bench, MeasuredKeys, refused};
 use crate::identification as figure;
 use specgen_language::model::LegModelKind;
 use specgen_language::outcome::{Failure, Outcome};
-use specgen_language::output::write_file;
+use specgen_language::output::write_table;
 use specgen_language::shell;
 use specgen_language::table::{right, row};
 use specgen_language::ui::Ui;
@@ -107,7 +107,7 @@ pub fn run(
     if let Some(output) = output {
         let text = identify::write_leg_csv(&model);
         let text = if record.simulated { identify::marked_as_simulated(&text) } else { text };
-        write_file(output, text.as_bytes())?;
+        write_table(output, text.as_bytes())?;
     }
     let draw = || figure::everett(&identified, choice.as_ref(), validation.as_ref());
     let plot = bench.plot.write("Everett table", draw)?;

@@ -12,7 +12,7 @@ use specgen_identify::mode::{self, Mode};
 use specgen_identify::rate::{Inertia, RateModel};
 use specgen_identify::{Drive, Input, Prediction, declared, predict, read_drive, read_file, read_leg_csv};
 use specgen_language::outcome::{Failure, Outcome, Refusal};
-use specgen_language::output::write_file;
+use specgen_language::output::write_table;
 use specgen_language::spec::{SpecSource, leg_lines};
 use specgen_language::ui::Ui;
 
@@ -59,7 +59,7 @@ pub fn run(options: &Options, bench: &Bench, ui: &mut Ui) -> Result<(), Failure>
     model.inertia = inertia(options, &model, &drive);
     let prediction = predict(&model, &drive).map_err(refused)?;
     if let Some(output) = &options.output {
-        write_file(output, csv(&prediction).as_bytes())?;
+        write_table(output, csv(&prediction).as_bytes())?;
     }
     let plot = bench.plot.write("Prediction", || figure::prediction(&prediction))?;
     let files = options.output.as_ref().map(|path| wrote(path)).into_iter().chain(plot).collect();

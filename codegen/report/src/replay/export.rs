@@ -7,7 +7,7 @@ use host_sim::record::{self, Block, Header, ReplayedRows};
 
 use super::messages::Messages;
 use specgen_language::outcome::Failure;
-use specgen_language::output::{PendingFile, unwritten};
+use specgen_language::output::{TableFile, unwritten};
 
 /// Files being written.
 #[derive(Default)]
@@ -42,14 +42,14 @@ impl Exports {
 }
 
 struct Csv {
-    file: BufWriter<PendingFile>,
+    file: BufWriter<TableFile>,
     /// Name given by the user.
     path: PathBuf,
 }
 
 impl Csv {
     fn new(path: &Path) -> Result<Self, Failure> {
-        Ok(Self { file: BufWriter::new(PendingFile::create(path)?), path: path.to_owned() })
+        Ok(Self { file: BufWriter::new(TableFile::create(path)?), path: path.to_owned() })
     }
 
     fn add(&mut self, header: &Header, block: &Block, again: Option<ReplayedRows>, first: bool) -> Result<(), Failure> {

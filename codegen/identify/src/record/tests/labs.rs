@@ -195,6 +195,13 @@ fn written_arrays_are_the_same_record() {
         let written = form.of_csv(named.as_bytes()).unwrap();
         let record = assert_same("texts", read(&written, &[], None));
         assert!(note(&record).contains("left out: `mode`"), "{form:?}: {}", note(&record));
+        if form == Form::Npz {
+            let at = written.windows(8).position(|bytes| bytes == 2.5_f64.to_le_bytes()).unwrap();
+            let mut damaged = written.clone();
+            damaged[at] ^= 1;
+            let found = read(&damaged, &[], None).unwrap_err();
+            assert!(found[0].code == "E0503" && found[0].message.contains("`drive_V.npy` is damaged"), "{found:?}");
+        }
         let cut = read(&written[..written.len() / 2], &[], None).unwrap_err();
         assert!(cut[0].code == "E0503" && cut[0].message.contains("cut off"), "{form:?}: {cut:?}");
     }

@@ -1,7 +1,7 @@
 //! Writes MAT-files of version 5, to test how they are read.
 
 /// An element with its type, length and bytes.
-fn element(kind: u32, bytes: &[u8]) -> Vec<u8> {
+pub(super) fn element(kind: u32, bytes: &[u8]) -> Vec<u8> {
     let mut all = [kind.to_le_bytes(), (bytes.len() as u32).to_le_bytes()].concat();
     all.extend(bytes);
     all.resize(all.len().next_multiple_of(8), 0);
@@ -9,9 +9,13 @@ fn element(kind: u32, bytes: &[u8]) -> Vec<u8> {
 }
 
 fn array(class: u8, size: [u32; 2], name: &str, data: &[Vec<u8>]) -> Vec<u8> {
+    sized(class, &element(5, &size.map(u32::to_le_bytes).concat()), &element(1, name.as_bytes()), &data.concat())
+}
+
+/// An array of these elements.
+pub(super) fn sized(class: u8, size: &[u8], name: &[u8], data: &[u8]) -> Vec<u8> {
     let flags = element(6, &[class, 0, 0, 0, 0, 0, 0, 0]);
-    let size = element(5, &size.map(u32::to_le_bytes).concat());
-    element(14, &[flags, size, element(1, name.as_bytes()), data.concat()].concat())
+    element(14, &[&flags, size, name, data].concat())
 }
 
 /// A matrix, column by column.
