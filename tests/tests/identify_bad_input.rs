@@ -125,7 +125,7 @@ fn a_huge_file_that_is_no_text_is_refused_without_reading_it_whole() {
 fn columns() {
     let text = csv(&good());
     refused(&text.replacen("drive_V", "drve_V", 1), "E0504", "`drive_V` is missing");
-    let all = errors(text.replacen("displacement_um", "displacement_inch", 1).as_bytes());
+    let all = errors(text.replacen("displacement_um", "displacement_foot", 1).as_bytes());
     assert!(all[0].help.contains("`displacement_nm`"), "{all:?}");
     let all = errors(text.replacen("time_s,drive_V,displacement_um", "a,b,c", 1).as_bytes());
     assert_eq!(all.len(), 3, "all three columns are reported: {all:?}");

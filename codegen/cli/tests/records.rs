@@ -171,7 +171,7 @@ fn a_value_that_is_no_number_is_named_by_its_line() {
     for (row, message, help, code) in [
         ("1,abc,2", &["`drive_V` is `abc`", "not a number"][..], "plain number", "E0506"),
         ("1,2 V,2", &["`drive_V` is `2 V`", "not a number"], "plain number", "E0506"),
-        ("1,,2", &["`drive_V` is ``"], "plain number", "E0506"),
+        ("1,,2", &["`drive_V` is empty"], "complete or delete", "E0506"),
         ("1,2", &["`displacement_um` is missing", "too short"], "complete or delete the line", "E0506"),
         ("1,2,NaN", &["`displacement_um` is `NaN`", "not a finite number"], "delete the sample", "E0508"),
         ("1,-inf,2", &["`drive_V` is `-inf`"], "delete the sample", "E0508"),

@@ -7,6 +7,7 @@ pub(crate) mod foreign;
 mod head;
 mod lines;
 pub(crate) mod names;
+mod number;
 mod scan;
 
 use std::io::Read;
@@ -18,7 +19,7 @@ use names::Conversion;
 use specgen_language::diagnostic::{Code, codes};
 use specgen_language::interrupt;
 
-pub(crate) use head::{Head, decoded};
+pub(crate) use head::{Head, Shape, decoded};
 pub(crate) use lines::LineNumbers;
 pub(crate) use scan::{Part, tables};
 
@@ -178,6 +179,14 @@ impl<'a> Content<'a> {
         if let Self::Text(_, part) = self { part.curves } else { 0 }
     }
 
+    /// Rows of numbers.
+    pub(crate) fn rows(&self) -> usize {
+        match self {
+            Self::Text(_, part) => part.rows,
+            Self::Arrays(arrays, _) => arrays.first().map_or(0, |(_, values)| values.len()),
+        }
+    }
+
     /// The names, and what reads the columns below them; `None` after the problem was reported.
     pub(crate) fn open(self, findings: &mut Findings) -> Option<(Head, Reader<'a>)> {
         match self {
@@ -185,10 +194,10 @@ impl<'a> Content<'a> {
                 let (head, lines) = open_part(text, part, &RECORD, findings)?;
                 Some((head, Box::new(|wanted, findings| lines.read(wanted, findings))))
             }
-            Self::Arrays(arrays, comment) => {
-                let head = Head::of_arrays(arrays.iter().map(|(name, _)| name.trim().to_owned()).collect());
-                Some((head, Box::new(move |wanted, findings| of_arrays(&arrays, &comment, wanted, findings))))
-            }
+            Self::Arrays(arrays, comment) => Some((
+                Head::of_arrays(&arrays),
+                Box::new(move |wanted, findings| of_arrays(&arrays, &comment, wanted, findings)),
+            )),
         }
     }
 }
@@ -271,7 +280,7 @@ impl Lines<'_> {
     }
 
     fn finite(&self, field: &[u8]) -> Option<f64> {
-        let (value, _) = head::number(std::str::from_utf8(field).ok()?, self.separator)?;
+        let (value, _) = number::number(std::str::from_utf8(field).ok()?, self.separator)?;
         Some(value).filter(|value| value.is_finite())
     }
 
@@ -289,7 +298,7 @@ impl Lines<'_> {
             return f64::NAN;
         }
         let text = decoded(field);
-        match head::number(&text, self.separator) {
+        match number::number(&text, self.separator) {
             Some((value, _)) if !value.is_finite() => return format.report_not_finite(line, name, &text, findings),
             Some((value, sign)) => {
                 if sign.is_none() || *self.decimal.get_or_insert(sign.unwrap_or('.')) == sign.unwrap_or('.') {
@@ -297,6 +306,10 @@ impl Lines<'_> {
                 }
                 let message = format!("`{name}` is `{text}`: the numbers above have another decimal sign");
                 findings.add(format.value, Some(line), message, "write all numbers with the same decimal sign");
+            }
+            None if text.is_empty() => {
+                let message = format!("`{name}` is empty");
+                findings.add(format.value, Some(line), message, "complete or delete the line");
             }
             None => {
                 let shown: String = text.chars().take(40).collect();

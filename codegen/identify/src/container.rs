@@ -183,7 +183,8 @@ fn tables(contents: Contents) -> Tables {
     }
     left_out.extend(contents.others.into_iter().map(|(name, what)| format!("`{name}` ({what})")));
     let mut tables: Vec<(usize, Table)> = Vec::new();
-    for same in of_length.into_values() {
+    for mut same in of_length.into_values() {
+        join_signals(&mut same);
         let mut names = BTreeSet::new();
         let is_unique = same.iter().all(|one| names.insert(one.array.name.clone()));
         let timed = same.iter().filter(|one| is_time(&one.array.name)).map(|one| &one.array.group);
@@ -212,6 +213,26 @@ fn tables(contents: Contents) -> Tables {
     );
     tables.retain(|table| !is_single(table));
     Tables { tables, left_out, comment: contents.comment }
+}
+
+/// Puts groups together that have one array each beside the same times, as Simulink writes a struct for each signal.
+fn join_signals(same: &mut Vec<Channels>) {
+    let (times, signals): (Vec<_>, Vec<_>) = same.iter().partition(|one| is_time(&one.array.name));
+    let groups = |all: &[&Channels]| all.iter().map(|one| one.array.group.clone()).collect::<BTreeSet<_>>();
+    let [of_times, of_signals] = [groups(&times), groups(&signals)];
+    let is_apart = of_times.len() == times.len() && of_signals.len() == signals.len() && of_times == of_signals;
+    if times.len() < 2 || !is_apart || times.iter().any(|one| one.array.values != times[0].array.values) {
+        return;
+    }
+    let first = times[0].order;
+    let is_unique = signals.iter().map(|one| &one.array.name).collect::<BTreeSet<_>>().len() == signals.len();
+    same.retain(|one| one.order == first || !is_time(&one.array.name));
+    for one in same.iter_mut() {
+        let group = std::mem::take(&mut one.array.group);
+        if !is_unique && one.order != first {
+            one.array.name = format!("{group}.{}", one.array.name);
+        }
+    }
 }
 
 /// An array of one or two dimensions as columns.

@@ -108,7 +108,20 @@ fn is_record(table: &Extent) -> bool {
 
 /// Whether a file that begins so is unpacked in memory.
 fn is_packed(first: &[u8]) -> bool {
-    Kind::of(first).is_some() || matches!(first, [0x1f, 0x8b, ..] | [0xff, 0xfe, ..] | [0xfe, 0xff, ..])
+    Kind::of(first).is_some() || first.starts_with(&[0x1f, 0x8b]) || utf_16(first).is_some()
+}
+
+/// Whether the text in UTF-16 that begins so has its high bytes first, and the length of its mark. Without a mark, its
+/// first two letters are of ASCII.
+fn utf_16(first: &[u8]) -> Option<(bool, usize)> {
+    match first {
+        [0xff, 0xfe, 0, 0, ..] => None,
+        [0xff, 0xfe, ..] => Some((false, 2)),
+        [0xfe, 0xff, ..] => Some((true, 2)),
+        [b'\t'..=b'~', 0, b'\t'..=b'~', 0, ..] => Some((false, 0)),
+        [0, b'\t'..=b'~', 0, b'\t'..=b'~', ..] => Some((true, 0)),
+        _ => None,
+    }
 }
 
 /// Unpacks gzip, then UTF-16; `None` after the problem was reported.
@@ -132,15 +145,14 @@ fn unpacked(mut file: Vec<u8>, limit: MaxSize, findings: &mut Findings) -> Optio
     if let Some(kind) = Kind::of(&file) {
         return Some(Unpacked::Tables(kind, file));
     }
-    if let [a @ (0xff | 0xfe), b @ (0xff | 0xfe), rest @ ..] = &file[..]
-        && a != b
-    {
-        let (pairs, odd) = rest.as_chunks::<2>();
+    if let Some((is_big_endian, marks)) = utf_16(&file) {
+        let (pairs, odd) = file[marks..].as_chunks::<2>();
         if !odd.is_empty() {
             let message = "is text in UTF-16 that is cut off: it has an odd number of bytes".to_owned();
             return findings.refuse(codes::RECORD_NOT_TEXT, None, message, "copy the file again, or export it again");
         }
-        let unit = |pair: &[u8; 2]| if *a == 0xff { u16::from_le_bytes(*pair) } else { u16::from_be_bytes(*pair) };
+        let read = if is_big_endian { u16::from_be_bytes } else { u16::from_le_bytes };
+        let unit = |pair: &[u8; 2]| read(*pair);
         let text = char::decode_utf16(pairs.iter().map(unit)).map(|c| c.unwrap_or(char::REPLACEMENT_CHARACTER));
         // At most three bytes each; growing it would take more.
         let mut whole = String::with_capacity(3 * pairs.len());

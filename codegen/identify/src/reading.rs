@@ -65,9 +65,9 @@ pub(crate) fn shown_size(bytes: u64) -> String {
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct ColumnChoice {
     /// `NAME=COLUMN`.
-    text: String,
+    pub(crate) text: String,
     /// The quantity's name in this project, or `sample`.
-    quantity: &'static str,
+    pub(crate) quantity: &'static str,
     /// Its name, or its number from 1, and what follows it: a name may look like a scale.
     pub(crate) column: String,
     /// Its unit; none if only the scale has one.
@@ -118,14 +118,14 @@ impl Reading {
         self.rate
     }
 
-    /// The column that the user names for a quantity.
+    /// The column that the user names for a quantity; the last one if there are several.
     pub(crate) fn column(&self, quantity: &str) -> Option<&ColumnChoice> {
-        self.columns.iter().find(|chosen| chosen.quantity == quantity)
+        self.columns.iter().rev().find(|chosen| chosen.quantity == quantity)
     }
 
-    /// The entries, as the user gave them.
-    pub(crate) fn given(&self) -> impl Iterator<Item = &str> {
-        self.columns.iter().map(|chosen| chosen.text.as_str())
+    /// The columns that the user names, the last one for each quantity.
+    pub(crate) fn chosen(&self) -> impl Iterator<Item = &ColumnChoice> {
+        self.columns.iter().filter(|one| self.column(one.quantity) == Some(*one))
     }
 
     /// The column with sample numbers.

@@ -59,7 +59,7 @@ pub(crate) fn check_time(lines: &LineNumbers, time: &[f64], findings: &mut Findi
         increasing = false;
         let message = format!("time goes from {} s to {} s ({dt:e} s); it must increase", time[k], time[k + 1]);
         let help = if *dt == 0.0 {
-            "delete the repeated sample, or write the time with more digits"
+            "delete the repeated sample, write the time with more digits, or give `--rate HZ`"
         } else {
             "sort or re-record; is the time column the right one?"
         };

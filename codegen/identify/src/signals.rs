@@ -94,7 +94,7 @@ pub(crate) fn columns_of(
     reading: &Reading,
     findings: &mut Findings,
 ) -> Option<Signals> {
-    let curves = content.curves();
+    let (curves, rows) = (content.curves(), content.rows());
     let (header, read) = content.open(findings)?;
     if wanted[0].name == TIME && curves >= CURVES && !has_time(&header, reading) {
         let message = format!(
@@ -103,9 +103,19 @@ pub(crate) fn columns_of(
         let help = "record time, drive and displacement without a break, on the ways back as well";
         return findings.refuse(codes::RECORD_GAP, None, message, help);
     }
+    if header.filled.len() > COLUMNS && rows > 0 && rows < header.filled.len() {
+        let message = format!("has {rows} lines of {} numbers: rows and columns are exchanged", header.filled.len());
+        return findings.refuse(
+            codes::RECORD_HEADER,
+            None,
+            message,
+            "write a line for each sample, not for each column",
+        );
+    }
     let places = places::find(&header, wanted, reading, findings)?;
     let there: Vec<Column> = places.columns.iter().flatten().copied().collect();
     let Samples { lines, columns: values, simulated } = read(&there, findings);
+    let is_clock = places.columns[0].is_some_and(|column| header.clock() == Some(column.at));
     let mut values = values.into_iter();
     let mut columns: Vec<Option<Vec<f64>>> =
         places.columns.iter().map(|place| place.and_then(|_| values.next())).collect();
@@ -117,6 +127,9 @@ pub(crate) fn columns_of(
             None => *time = Some((0..lines.len()).map(|k| k as f64 * interval).collect()),
         }
     }
+    if let (TIME, true, Some(time)) = (wanted[0].name, is_clock, &mut columns[0]) {
+        since_first(time);
+    }
     let mut signals = Signals { shown_as: findings.path().to_owned(), lines, columns, simulated, warnings: Vec::new() };
     if let (TIME, Some(Some(time)), false) = (wanted[0].name, signals.columns.first(), findings.any_error())
         && let Some(stretch) = stretches::chosen(time, choice, findings)
@@ -126,6 +139,24 @@ pub(crate) fn columns_of(
     }
     Some(signals)
 }
+
+/// Times of day (s) become times since the first; after midnight they start again.
+fn since_first(time: &mut [f64]) {
+    let (mut before, mut last) = (-time.first().copied().unwrap_or_default(), f64::NEG_INFINITY);
+    for value in time {
+        if *value < last - 0.5 * DAY {
+            before += DAY;
+        }
+        last = *value;
+        *value += before;
+    }
+}
+
+/// A day, s.
+const DAY: f64 = 86_400.0;
+
+/// Numbers in each of a few lines from which a file has a line for each column.
+const COLUMNS: usize = 100;
 
 /// Curves in one direction from which a file is a magnetometer's.
 const CURVES: usize = 3;

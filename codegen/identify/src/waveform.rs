@@ -56,8 +56,9 @@ fn parse_rows(text: &str, shown_as: &str, period: f64, findings: &mut Findings) 
         return findings.refuse(codes::WAVEFORM_HEADER, None, "is empty".to_owned(), EXPECTED);
     }
     let meanings = meanings(&header, findings)?;
-    let columns = meanings.iter().zip(&header.names).enumerate();
-    let all: Vec<Column> = columns.map(|(at, (&(_, conversion), name))| Column { at, name, conversion }).collect();
+    let names = header.names.iter().enumerate().filter(|(_, name)| is_read(name));
+    let columns = meanings.iter().zip(names);
+    let all: Vec<Column> = columns.map(|(&(_, conversion), (at, name))| Column { at, name, conversion }).collect();
     let Samples { lines, columns: values, .. } = lines.read(&all, findings);
     let lines: Vec<usize> = lines.iter().collect();
     let mut rows = vec![[0.0; 6]; lines.len()];
@@ -88,16 +89,22 @@ const FORMAT: Format = Format {
 
 const EXPECTED: &str = "name the columns by axis and unit in the first line, such as `x_um,y_um,z_um,theta_x_urad`";
 
+/// Whether a column may be part of a pose: it has a name, and does not count the rows.
+fn is_read(name: &str) -> bool {
+    !name.is_empty() && !names::is_sample_number(name)
+}
+
 /// Content of each column, or `None` after every problem of the header was reported.
 fn meanings(header: &Head, findings: &mut Findings) -> Option<Vec<Meaning>> {
     let line = Some(header.line);
     let mut found: Vec<Meaning> = Vec::new();
-    for (place, name) in header.names.iter().enumerate() {
+    for (place, name) in header.names.iter().enumerate().filter(|(_, name)| is_read(name)) {
         match meaning(name) {
             Ok(meaning) => {
                 if let Some(first) = found.iter().position(|(axis, _)| *axis == meaning.0) {
-                    let message =
-                        format!("columns {} and {} (`{name}`) hold the same coordinate", first + 1, place + 1);
+                    let first = header.names.iter().enumerate().filter(|(_, name)| is_read(name)).nth(first);
+                    let first = first.map_or(0, |(at, _)| at) + 1;
+                    let message = format!("columns {first} and {} (`{name}`) hold the same coordinate", place + 1);
                     findings.add(codes::WAVEFORM_HEADER, line, message, "keep one of them");
                 }
                 found.push(meaning);
@@ -166,16 +173,18 @@ mod tests {
         let waveform = parse(text.trim_start_matches('\u{feff}'), "w.csv", 1e-3).unwrap();
         assert_eq!(waveform.lines, [3, 4]);
         assert_eq!(waveform.rows, [[-1e-6, 0.0, 0.0, 0.0, 0.0, 0.5e-3], [25.0 * 1e-6, 0.0, 0.0, 0.0, 0.0, 0.0]]);
+        let under = parse("n,time,x,rx,\n,ms,mm,deg,\n0,0,0.001,180,\n1,1,0,0,\n", "w.csv", 1e-3).unwrap();
         let other = parse("Time [s];X (mm);Rx deg;Z, nm\n0;0,001;180;7\n0,001;0;0;0\n", "w.csv", 1e-3).unwrap();
         let [x, _, z, theta_x, ..] = other.rows[0];
         let near = |value: f64, expected: f64| (value / expected - 1.0).abs() < 1e-12;
+        assert!(near(under.rows[0][0], 1e-6) && near(under.rows[0][3], core::f64::consts::PI), "{:?}", under.rows);
         assert!(near(x, 1e-6) && near(z, 7e-9) && near(theta_x, core::f64::consts::PI), "{:?}", other.rows);
     }
 
     #[test]
     fn a_bad_header_comes_with_its_fix() {
         assert!(refused("")[0].contains("is empty"));
-        assert!(refused("x_um,x_nm\n1,2\n")[0].contains("hold the same coordinate"));
+        assert!(refused("n,x_um,x_nm\n0,1,2\n")[0].contains("columns 2 and 3 (`x_nm`) hold the same coordinate"));
         assert!(refused("x_um,theta_x_turns\n")[0].contains("`theta_x_rad`"));
         assert!(refused("x_um,z_V\n")[0].contains("`z_um`"));
         assert!(refused("theta_x\n")[0].contains("`theta_x_urad`"));

@@ -65,7 +65,8 @@ fn suggested_options_are_accepted() {
     let untimed = |separator: &str| rows.iter().map(|[_, u, y]| format!("{u}{separator}{y}\n")).collect::<String>();
     let numbered = rows.iter().enumerate().map(|(k, [_, u, y])| format!("{k};{u};{y}\n")).collect::<String>();
     let empty_first = rows.iter().map(|[t, u, y]| format!(",{t},{u},{y}\n")).collect::<String>();
-    let files: [(&str, Vec<u8>); 12] = [
+    let nanometres = rows.iter().map(|[t, u, y]| format!("{y};{t};{u}\n", y = 1e3 * y)).collect::<String>();
+    let files: [(&str, Vec<u8>); 16] = [
         ("commas.csv", file("Time,s;Ch 1,V;Ch2,um\n", ";")),
         ("pairs.csv", file("Time,s,Ch1,V,Ch2,um\n", ",")),
         ("numbers.csv", file("", ",")),
@@ -74,10 +75,14 @@ fn suggested_options_are_accepted() {
         ("untimed.txt", format!("U\ty\n{}", untimed("\t")).into_bytes()),
         ("untimed.csv", untimed(";").into_bytes()),
         ("samples.csv", format!("sample;U;it's $y\n{numbered}").into_bytes()),
-        ("near.csv", file("tme_s,drive,displacement_in\n", ",")),
+        ("near.csv", file("tme_s,drive,displacement_ft\n", ",")),
         ("same.csv", file("a,a,a=`b`\n", ",")),
         ("scope.csv", file("Model,X\nSource,CH1,CH2\nTIME,CH1,CH2\n", ",")),
         ("rows.npy", npy(&rows)),
+        ("volts.csv", file("Time (s),Voltage (V),Gauge (V)\n", ",")),
+        ("labview.lvm", file("X_Value\tVoltage_0\tVoltage_1\n", "\t")),
+        ("units.csv", format!("Weg (nm);Elapsed;Spannung [V]\n{nanometres}").into_bytes()),
+        ("moments.csv", file("Time Stamp (sec),Field (Oe),Moment (emu)\n", ",")),
     ];
     for (name, content) in files {
         let folder = Folder::new();

@@ -2,6 +2,7 @@
 //! comment), their separator, and the form of numbers.
 
 use super::names;
+use super::number::{clock, is_date, number};
 
 /// Number of lines in which the names are searched.
 pub(super) const LINES: usize = 300;
@@ -15,12 +16,28 @@ pub(crate) struct Head {
     pub(crate) line: usize,
     /// Time between samples stated in the preamble, s.
     pub(crate) interval: Option<f64>,
-    /// Columns, from 0, that have a number in the first sample.
-    pub(crate) filled: Vec<usize>,
+    /// Columns, from 0, that have a number in the first sample, and what their first samples are.
+    pub(crate) filled: Vec<(usize, Shape)>,
     /// Index of the first line after them.
     pub(super) next: usize,
     /// Separator of the samples.
     pub(super) separator: u8,
+}
+
+/// What the first samples of a column are, if there are at least three, or times of day.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Shape {
+    /// All equal.
+    Constant,
+    /// Integers in steps of 1.
+    Counting,
+    /// Rising, as times do.
+    Rising,
+    Other,
+    /// There are too few.
+    Unknown,
+    /// Times of day.
+    Clock,
 }
 
 /// A line and its number.
@@ -42,17 +59,21 @@ pub(super) fn find(lines: &[Line], preamble: bool) -> Option<Head> {
     let above = |row: usize, fits: &dyn Fn(&[u8]) -> bool| (0..row).rev().find(|&at| fits(&lines[at].1));
     match row {
         // Some programs write the names into the last comment.
-        Some(row) if row == first => match above(row, &is_comment) {
-            Some(at) if known(at) > 1 => Some(Head { next: row, ..at_line(lines, at, interval) }),
-            _ => {
-                let separator = separator_of(&lines[row].1).unwrap_or(b',');
-                Some(Head { next: row, interval, ..Head::without_names(lines[row].0, separator) })
+        Some(row) if row == first => {
+            match above(row, &is_comment).map(|at| (known(at), at_line(lines, at, interval))) {
+                Some((known, head)) if known > 1 || head.has_units_of(&lines[row].1) => {
+                    Some(Head { next: row, ..head })
+                }
+                _ => {
+                    let separator = separator_of(&lines[row].1).unwrap_or(b',');
+                    Some(Head { next: row, interval, ..Head::without_names(lines[row].0, separator) })
+                }
             }
-        },
+        }
         Some(row) => {
             // A line with a number among its fields is an invalid row of numbers.
             let has_number = |line: &[u8]| names_of(line).iter().any(|name| name.parse::<f64>().is_ok());
-            let is_text = |line: &[u8]| has_fields(line) && !is_units(line) && !has_number(line);
+            let is_text = |line: &[u8]| has_fields(line) && !is_units(line) && !is_rule(line) && !has_number(line);
             Some(at_line(lines, above(row, &is_text).unwrap_or(first), interval))
         }
         None => Some(at_line(lines, first, interval)),
@@ -61,25 +82,67 @@ pub(super) fn find(lines: &[Line], preamble: bool) -> Option<Head> {
 
 fn at_line(lines: &[Line], at: usize, interval: Option<f64>) -> Head {
     let (line, text) = &lines[at];
-    let mut names = names_of(text);
-    let mut next = at + 1;
-    if let Some((_, below)) = lines.get(next).filter(|(_, below)| is_units(below)) {
-        for (name, unit) in names.iter_mut().zip(names_of(below)) {
-            if !unit.is_empty() && !names::is_known(name) {
-                *name = format!("{name} [{}]", unit.trim_matches(['[', ']', '(', ')']));
-            }
-        }
-        next += 1;
-    }
-    let rows = lines[next..].iter().find_map(|(_, line)| Some((separator_of(line)?, line)));
+    let rows = lines[at + 1..].iter().find_map(|(_, line)| Some((separator_of(line)?, line)));
     let separator = rows.map_or_else(|| of_names(text), |(separator, _)| separator);
-    if rows.is_some_and(|(separator, row)| names.len() == 2 * split(row, separator).len())
+    let count = rows.map(|(separator, row)| split(row, separator).len());
+    let mut names = fitting_names(text, count);
+    if Some(names.len()) == count.map(|count| 2 * count)
         && names[1..].iter().step_by(2).all(|unit| names::is_unit(unit))
     {
         // `Time,s,Ch1,V` above columns that commas separate.
         names = names.chunks(2).map(|pair| pair.join(",")).collect();
     }
-    Head { names, next, interval, ..Head::without_names(*line, separator) }
+    let mut head = Head { names, next: at + 1, interval, ..Head::without_names(*line, separator) };
+    while let Some((_, below)) = lines.get(head.next).filter(|(_, below)| is_below_names(below)) {
+        head.add_units(below);
+        head.next += 1;
+    }
+    if head.next == at + 1
+        && let Some((_, above)) = at.checked_sub(1).map(|at| &lines[at]).filter(|(_, above)| is_units(above))
+    {
+        head.add_units(above);
+    }
+    head
+}
+
+/// The names in a line; `count`: of the columns below, if there are any. Blanks that separate columns may also be within
+/// the names or before their units.
+fn fitting_names(line: &[u8], count: Option<usize>) -> Vec<String> {
+    let names = names_of(line);
+    let words = split(uncommented(line), BLANK);
+    if count.is_none_or(|count| count == names.len()) || words.len() < 2 {
+        return names;
+    }
+    let mut of_words: Vec<String> = Vec::new();
+    for word in words.into_iter().map(decoded) {
+        match of_words.last_mut() {
+            Some(last) if word.starts_with(['(', '[']) || last.contains(['(', '[']) && !last.ends_with([')', ']']) => {
+                *last = format!("{last} {word}");
+            }
+            _ => of_words.push(word),
+        }
+    }
+    let text = decoded(uncommented(line));
+    let of_gaps = text.replace('\t', "  ");
+    let of_gaps = of_gaps.split("  ").map(str::trim).filter(|name| !name.is_empty()).map(str::to_owned).collect();
+    [of_words, of_gaps].into_iter().find(|other: &Vec<String>| Some(other.len()) == count).unwrap_or(names)
+}
+
+/// Whether a line between names and rows is no row: units, or a rule.
+fn is_below_names(line: &[u8]) -> bool {
+    let fields = names_of(line);
+    let is_unit_or_number = |field: &String| field.is_empty() || names::is_unit(field) || field.parse::<f64>().is_ok();
+    let [first, rest @ ..] = &fields[..] else { return false };
+    // As in `Sequence,Volt,0,1e-3`.
+    let begins_with_word = first.starts_with(char::is_alphabetic) && first.parse::<f64>().is_err();
+    let are_units = begins_with_word && rest.iter().any(|field| names::is_unit(field));
+    is_units(line) || is_rule(line) || are_units && rest.iter().all(is_unit_or_number)
+}
+
+/// Whether a line is drawn, as `-----` or `|---|---|`.
+fn is_rule(line: &[u8]) -> bool {
+    let line = line.trim_ascii();
+    line.len() > 2 && line.iter().all(|byte| matches!(byte, b'-' | b'=' | b'_' | b'|' | b'+' | b':' | b' ' | b'\t'))
 }
 
 /// The separator with which a line is a row of numbers.
@@ -96,8 +159,13 @@ fn of_names(line: &[u8]) -> u8 {
     SEPARATORS.into_iter().rev().max_by_key(|separator| known(*separator)).unwrap_or(b',')
 }
 
+/// A line without its mark of a comment.
+fn uncommented(line: &[u8]) -> &[u8] {
+    line.strip_prefix(b"#").or_else(|| line.strip_prefix(b"%")).unwrap_or(line)
+}
+
 pub(super) fn names_of(line: &[u8]) -> Vec<String> {
-    let line = line.strip_prefix(b"#").or_else(|| line.strip_prefix(b"%")).unwrap_or(line);
+    let line = uncommented(line);
     split(line, of_names(line)).into_iter().map(decoded).collect()
 }
 
@@ -106,11 +174,25 @@ fn is_units(line: &[u8]) -> bool {
     fields.len() > 1 && fields.iter().all(|field| field.is_empty() || names::is_unit(field)) && !is_blank(line)
 }
 
-/// `Delta_X` of LabVIEW, s.
+/// Names of a sampling interval in preambles, in lower case letters.
+const INTERVALS: [&str; 6] = ["deltax", "sampleinterval", "samplinginterval", "sampletime", "xincrement", "timestep"];
+
+/// The sampling interval in a line such as `Delta_X\t0,001`, `Sample Interval,1e-3,s` or `# SAMPLE_TIME = 0.001`, s.
 fn interval(line: &[u8]) -> Option<f64> {
-    let rest = line.strip_prefix(b"Delta_X")?;
-    let text = decoded(rest).replace(',', ".");
-    text.split_whitespace().next()?.parse().ok().filter(|step: &f64| step.is_finite() && *step > 0.0)
+    let text = decoded(uncommented(line));
+    let (name, rest) = text.split_once(['\t', ',', ';', '=', ':'])?;
+    if !INTERVALS.contains(&names::plain(name).as_str()) {
+        return None;
+    }
+    let rest = rest.trim_matches(|c: char| c.is_whitespace() || matches!(c, ',' | ';'));
+    let mut words = rest.split([' ', '\t', ';']);
+    let number = words.next()?;
+    let (number, unit) = match number.split_once(',') {
+        Some((whole, unit)) if unit.contains(char::is_alphabetic) => (whole.to_owned(), Some(unit)),
+        _ => (number.replace(',', "."), words.next()),
+    };
+    let per = unit.and_then(|unit| names::quantity("time_s")?.per(unit)).unwrap_or(1.0);
+    number.parse().ok().map(|step: f64| step / per).filter(|step| step.is_finite() && *step > 0.0)
 }
 
 /// Rows that are checked for decimal commas.
@@ -122,17 +204,53 @@ impl Head {
         Self { names: Vec::new(), line, interval: None, filled: Vec::new(), next: 0, separator }
     }
 
-    /// Of arrays with these names.
-    pub(crate) fn of_arrays(names: Vec<String>) -> Self {
-        Self { filled: (0..names.len()).collect(), names, ..Self::without_names(1, b',') }
+    /// Of named arrays.
+    pub(crate) fn of_arrays(arrays: &[(String, Vec<f64>)]) -> Self {
+        let filled = arrays.iter().map(|(_, values)| Shape::of(values)).enumerate().collect();
+        let names = arrays.iter().map(|(name, _)| name.trim().to_owned()).collect();
+        Self { filled, names, ..Self::without_names(1, b',') }
+    }
+
+    /// The first column with times of day.
+    pub(crate) fn clock(&self) -> Option<usize> {
+        self.filled.iter().find(|(_, shape)| *shape == Shape::Clock).map(|(at, _)| *at)
+    }
+
+    /// Appends the units in a line to the names without one; `Increment` has the interval of a counted time.
+    fn add_units(&mut self, line: &[u8]) {
+        for (name, unit) in self.names.iter_mut().zip(names_of(line)) {
+            if name.eq_ignore_ascii_case("increment") {
+                self.interval = self.interval.or_else(|| unit.parse().ok().filter(|step: &f64| *step > 0.0));
+            }
+            if names::is_unit(&unit) && !names::has_unit(name) {
+                *name = format!("{name} [{}]", unit.trim_matches(['[', ']', '(', ')']));
+            }
+        }
+    }
+
+    /// Whether there is a name for each number of a row, and a unit in one of them.
+    fn has_units_of(&self, row: &[u8]) -> bool {
+        let count = separator_of(row).map(|separator| split(row, separator).len());
+        Some(self.names.len()) == count && self.names.iter().any(|name| names::own_unit(name).is_some())
     }
 
     /// Finds the columns that have numbers in the first of the `lines` of samples.
     pub(super) fn find_filled(&mut self, lines: &[Line]) {
-        let Some((_, row)) = lines.iter().find(|(_, line)| has_fields(line)) else { return };
-        let is_number = |field: &[u8]| number(&decoded(field), self.separator).is_some();
-        let fields = split(row, self.separator).into_iter().enumerate();
-        self.filled = fields.filter(|(_, field)| is_number(field)).map(|(at, _)| at).collect();
+        let value = |field: &[u8]| number(&decoded(field), self.separator).map(|(value, _)| value);
+        let mut columns: Vec<(usize, Vec<f64>)> = Vec::new();
+        for (k, (_, row)) in lines.iter().filter(|(_, line)| has_fields(line)).enumerate() {
+            let fields: Vec<Option<f64>> = split(row, self.separator).into_iter().map(value).collect();
+            if k == 0 {
+                let filled = fields.into_iter().enumerate();
+                columns = filled.filter_map(|(at, value)| Some((at, vec![value?]))).collect();
+            } else {
+                columns.iter_mut().for_each(|(at, values)| values.extend(fields.get(*at).copied().flatten()));
+            }
+        }
+        self.filled = columns.iter().map(|(at, values)| (*at, Shape::of(values))).collect();
+        let first = lines.iter().find(|(_, line)| has_fields(line)).map(|(_, row)| split(row, self.separator));
+        let is_clock = |at: usize| first.as_ref().is_some_and(|row| clock(&decoded(row[at])).is_some());
+        self.filled.iter_mut().filter(|(at, _)| is_clock(*at)).for_each(|(_, shape)| *shape = Shape::Clock);
     }
 
     /// The line, the message and the help if commas are both decimal signs and separators in the `lines` of samples.
@@ -158,8 +276,21 @@ impl Head {
     }
 }
 
+impl Shape {
+    fn of(values: &[f64]) -> Self {
+        let all = |is: fn(f64) -> bool| values.windows(2).all(|pair| is(pair[1] - pair[0]));
+        match values {
+            _ if values.len() < 3 => Self::Unknown,
+            _ if all(|step| step == 0.0) => Self::Constant,
+            [first, ..] if all(|step| step == 1.0) && first.fract() == 0.0 => Self::Counting,
+            _ if all(|step| step > 0.0) => Self::Rising,
+            _ => Self::Other,
+        }
+    }
+}
+
 /// Separators in the order in which they are tried. Apart from the comma, none of them occurs in a number.
-const SEPARATORS: [u8; 4] = [b'\t', b';', b',', BLANK];
+const SEPARATORS: [u8; 5] = [b'\t', b';', b'|', b',', BLANK];
 /// Any number of blanks and tabs.
 const BLANK: u8 = b' ';
 
@@ -198,23 +329,15 @@ pub(crate) fn decoded(bytes: &[u8]) -> String {
     }
 }
 
-/// A number with its decimal sign, if it has one.
-pub(super) fn number(field: &str, separator: u8) -> Option<(f64, Option<char>)> {
-    if let Ok(value) = field.parse() {
-        return Some((value, field.contains('.').then_some('.')));
-    }
-    if separator == b',' || field.contains('.') || field.matches(',').count() != 1 {
-        return None;
-    }
-    field.replace(',', ".").parse().ok().map(|value| (value, Some(',')))
-}
-
-/// Whether a line is a row of numbers: at least two fields, some of which may be empty, but not all.
+/// Whether a line is a row of numbers: at least two fields, some of which may be empty or dates, but not all.
 pub(super) fn is_row(line: &[u8], separator: u8) -> bool {
     let fields = split(line, separator);
     let is_number = |field: &&[u8]| std::str::from_utf8(field).is_ok_and(|text| number(text, separator).is_some());
     let filled = fields.iter().filter(|field| !field.is_empty());
-    fields.len() > 1 && filled.clone().count() > 0 && filled.clone().all(is_number)
+    fields.len() > 1
+        // Not only a date and a time.
+        && filled.clone().any(|field| is_number(field) && !field.contains(&b':'))
+        && filled.clone().all(|field| is_number(field) || is_date(field))
 }
 
 /// Whether a line is empty, or has only separators.
@@ -273,17 +396,6 @@ mod tests {
     }
 
     #[test]
-    fn numbers_have_a_point_or_where_that_is_no_separator_a_comma() {
-        assert_eq!(number("-12.5e-3", b','), Some((-12.5e-3, Some('.'))));
-        assert_eq!(number("-12,5e-3", b';'), Some((-12.5e-3, Some(','))));
-        assert_eq!(number("7", b';'), Some((7.0, None)));
-        for bad in ["1.234,5", "1,234,5", "", "1 2", "2 V"] {
-            assert_eq!(number(bad, b';'), None, "{bad}");
-        }
-        assert_eq!(number("1,5", b','), None);
-    }
-
-    #[test]
     fn a_comment_that_begins_so_marks_a_file_as_simulated() {
         for mark in ["# simulated by specgen", "%Simulated", "#  simulated: by hand"] {
             assert!(is_mark(mark.as_bytes()), "{mark}");
@@ -297,6 +409,7 @@ mod tests {
     fn fields_lose_blanks_and_quotation_marks() {
         assert_eq!(split(b" a ,\"b, c\",", b','), [&b"a"[..], b"b, c", b""]);
         assert_eq!(split(b"  1   2\t3 ", b' '), [b"1", b"2", b"3"]);
-        assert!(is_row(b"1,5;2;", b';') && !is_row(b"1;x", b';') && !is_row(b";", b';') && !is_row(b"1,5", b';'));
+        assert!(is_row(b"1,5;2;", b';') && is_row(b"5.3.2024;1:02:03;2", b';') && !is_row(b"5.3.2024 1:02:03", b' '));
+        assert!(!is_row(b"1;x", b';') && !is_row(b";", b';') && !is_row(b"1,5", b';'));
     }
 }

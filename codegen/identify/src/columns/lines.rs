@@ -15,11 +15,18 @@ pub(super) struct LineReader<'a> {
     /// Lines that were read ahead, with their numbers.
     ahead: VecDeque<Line>,
     read: usize,
+    /// Last byte of a line: of old programs, a carriage return alone.
+    end: u8,
 }
 
 impl<'a> LineReader<'a> {
     pub(super) fn new(source: impl Read + 'a) -> Self {
-        Self { reader: BufReader::with_capacity(1 << 16, Box::new(source)), ahead: VecDeque::new(), read: 0 }
+        Self {
+            reader: BufReader::with_capacity(1 << 16, Box::new(source)),
+            ahead: VecDeque::new(),
+            read: 0,
+            end: b'\n',
+        }
     }
 
     /// Puts the next line into `line` and gives its number, counted from 1; `None` at the end.
@@ -63,7 +70,11 @@ impl<'a> LineReader<'a> {
 
     fn fetch(&mut self, line: &mut Vec<u8>) -> io::Result<Option<usize>> {
         line.clear();
-        (&mut self.reader).take(LONGEST as u64).read_until(b'\n', line)?;
+        if self.read == 0 {
+            let first = self.reader.fill_buf()?;
+            self.end = if first.contains(&b'\r') && !first.contains(&b'\n') { b'\r' } else { b'\n' };
+        }
+        (&mut self.reader).take(LONGEST as u64).read_until(self.end, line)?;
         if line.is_empty() {
             return Ok(None);
         }
@@ -71,7 +82,7 @@ impl<'a> LineReader<'a> {
         if self.read == 1 && line.starts_with(b"\xef\xbb\xbf") {
             line.drain(..3);
         }
-        if line.last() == Some(&b'\n') {
+        if line.last() == Some(&self.end) {
             line.pop();
             if line.last() == Some(&b'\r') {
                 line.pop();

@@ -35,9 +35,27 @@ impl Conversion {
     }
 }
 
-const TIME: &[Unit] = &[("s", 1.0), ("ms", 1e3), ("us", 1e6), ("ns", 1e9)];
+const TIME: &[Unit] = &[
+    ("s", 1.0),
+    ("ms", 1e3),
+    ("us", 1e6),
+    ("ns", 1e9),
+    ("min", 1.0 / 60.0),
+    ("h", 1.0 / 3600.0),
+    ("d", 1.0 / 86_400.0),
+];
 const VOLTAGE: &[Unit] = &[("V", 1.0), ("mV", 1e3), ("uV", 1e6), ("kV", 1e-3)];
-const LENGTH: &[Unit] = &[("um", 1.0), ("nm", 1e3), ("pm", 1e6), ("mm", 1e-3), ("m", 1e-6)];
+const LENGTH: &[Unit] = &[
+    ("um", 1.0),
+    ("nm", 1e3),
+    ("pm", 1e6),
+    ("mm", 1e-3),
+    ("m", 1e-6),
+    ("angstrom", 1e4),
+    ("in", 1.0 / 25_400.0),
+    ("mil", 1.0 / 25.4),
+    ("uin", 1.0 / 0.0254),
+];
 const ANGLE: &[Unit] = &[
     ("urad", 1.0),
     ("nrad", 1e3),
@@ -46,7 +64,10 @@ const ANGLE: &[Unit] = &[
     ("deg", 1e-6 * core::f64::consts::FRAC_1_PI * 180.0),
     ("arcsec", 1e-6 * core::f64::consts::FRAC_1_PI * 180.0 * 3600.0),
 ];
-const FORCE: &[Unit] = &[("N", 1.0), ("mN", 1e3), ("kN", 1e-3)];
+const FORCE: &[Unit] =
+    &[("N", 1.0), ("mN", 1e3), ("kN", 1e-3), ("lbf", 1.0 / 4.448_221_615_260_5), ("kgf", 1.0 / 9.806_65)];
+/// Units of the quantities of a record, by kind.
+const KINDS: [&[Unit]; 4] = [TIME, VOLTAGE, LENGTH, FORCE];
 
 /// Every quantity of a record.
 pub(crate) static QUANTITIES: [Quantity; 7] = [
@@ -67,6 +88,14 @@ pub(crate) static COORDINATES: [Quantity; 6] = [
     Quantity { name: "theta_x_urad", also: &["thetax", "rx", "θx"], units: ANGLE },
     Quantity { name: "theta_y_urad", also: &["thetay", "ry", "θy"], units: ANGLE },
     Quantity { name: "theta_z_urad", also: &["thetaz", "rz", "θz"], units: ANGLE },
+];
+
+/// Words of headers for a quantity, in lower case: those of up to three letters alone, longer ones also as part of another.
+const WORDS: [(&str, &[&str]); 4] = [
+    ("time", &["time", "zeit", "temps", "tiempo", "x_value", "t"]),
+    ("force", &["force", "kraft", "load"]),
+    ("displacement", &["disp", "posit", "sensor", "gauge", "laser", "weg", "pos", "dépl", "vibro", "target", "y"]),
+    ("drive", &["drive", "volt", "comm", "spannung", "tension", "amp", "cmd", "out", "dac", "u", "v"]),
 ];
 
 /// Names of a column with sample numbers.
@@ -127,6 +156,24 @@ impl Quantity {
         name == plain(self.plain()) || self.also.contains(&name.as_str())
     }
 
+    /// Whether `header` has a word for this quantity (1), for another one (-1), or neither (0).
+    pub(crate) fn resemblance(&self, header: &str) -> i32 {
+        let name = header.to_lowercase();
+        let words: Vec<&str> = name.split(|c: char| !c.is_alphabetic()).collect();
+        let has = |word: &&str| match word.len() {
+            ..4 => words.contains(word),
+            _ => name.contains(*word),
+        };
+        let of = WORDS.iter().find(|(_, all)| all.iter().any(has)).map(|(plain, _)| *plain);
+        match of {
+            Some(plain) if plain == self.plain() => 1,
+            Some("drive") if self.plain() == "monitor" || self.unit() == "V" => 1,
+            Some("displacement") if self.unit() == "um" => 1,
+            Some(_) => -1,
+            None => 0,
+        }
+    }
+
     /// Its unit.
     pub(crate) fn unit(&self) -> &'static str {
         self.units[0].0
@@ -149,15 +196,48 @@ fn per(units: &[Unit], unit: &str) -> Option<f64> {
 /// The header's unit, if it is of another kind, or not known and another text.
 pub(crate) fn per_denominator(header: &str, denominator: &str) -> Result<f64, String> {
     let (Some(own), denominator) = (parts(header).1, unit(denominator)) else { return Ok(1.0) };
-    let kinds = [TIME, VOLTAGE, LENGTH, FORCE];
-    let kind = |unit: &str| kinds.into_iter().find_map(|kind| per(kind, unit).map(|per| (kind[0].0, per)));
     match (kind(&own), kind(&denominator)) {
+        _ if denominator.is_empty() => Ok(1.0),
         (Some((a, own)), Some((b, other))) if a == b => Ok(own / other),
         (Some(_), Some(_)) => Err(own),
         (None, _) if own != denominator && own.chars().count() <= UNKNOWN && unit_in_brackets(header).is_some() => {
             Err(own)
         }
         _ => Ok(1.0),
+    }
+}
+
+/// The kind of a unit, named by its first unit, and its number in one of that.
+fn kind(unit: &str) -> Option<(&'static str, f64)> {
+    KINDS.into_iter().find_map(|kind| per(kind, unit).map(|per| (kind[0].0, per)))
+}
+
+/// Endings of names that mean something else more often than a unit, such as `V_in`.
+const AMBIGUOUS: [&str; 6] = ["s", "m", "in", "d", "h", "min"];
+
+/// The unit of a header as it is written in a name such as `drive_mV`; none if it is not known, or only a letter behind a
+/// blank or `_`.
+pub(crate) fn own_unit(header: &str) -> Option<&'static str> {
+    let own = parts(header).1?;
+    let is_plain = !header.trim().ends_with([')', ']']) && !header.contains(['/', ',']);
+    if is_plain && AMBIGUOUS.contains(&own.as_str()) {
+        return None;
+    }
+    KINDS.into_iter().flatten().map(|(name, _)| *name).find(|name| name.to_ascii_lowercase() == own)
+}
+
+/// Whether a header ends with brackets around what may be a unit, but none that is known, such as `Field (Oe)`.
+pub(crate) fn has_unknown_unit(header: &str) -> bool {
+    let is_short = |text: &String| (1..=UNKNOWN).contains(&text.chars().count()) && !text.contains([',', ':']);
+    unit_in_brackets(header).filter(is_short).is_some_and(|unit| kind(&unit).is_none() && unit.parse::<f64>().is_err())
+}
+
+/// `name` with a unit that is stated beside it, if it is known.
+pub(crate) fn with_unit(name: &str, unit: &str) -> String {
+    if is_unit(unit) && own_unit(name).is_none() && !has_unit(name) {
+        format!("{name} [{}]", unit.trim())
+    } else {
+        name.to_owned()
     }
 }
 
@@ -172,6 +252,11 @@ pub(crate) fn is_sample_number(header: &str) -> bool {
     SAMPLE.contains(&plain(header).as_str())
 }
 
+/// Whether a header names a quantity or a coordinate with its unit.
+pub(crate) fn has_unit(header: &str) -> bool {
+    QUANTITIES.iter().chain(&COORDINATES).any(|quantity| quantity.fits(header).is_some())
+}
+
 /// Whether a header names any quantity of a record.
 pub(crate) fn is_known(header: &str) -> bool {
     is_sample_number(header) || QUANTITIES.iter().any(|quantity| quantity.fits(header).is_some())
@@ -180,11 +265,11 @@ pub(crate) fn is_known(header: &str) -> bool {
 /// Whether a field of a line below the names is a unit.
 pub(crate) fn is_unit(field: &str) -> bool {
     let unit = field.trim_matches(['[', ']', '(', ')']);
-    QUANTITIES.iter().any(|quantity| quantity.per(unit).is_some())
+    QUANTITIES.iter().chain(&COORDINATES).any(|quantity| quantity.per(unit).is_some())
 }
 
 /// Lower case letters and digits of a name.
-fn plain(name: &str) -> String {
+pub(super) fn plain(name: &str) -> String {
     name.chars().filter(|c| c.is_alphanumeric()).flat_map(char::to_lowercase).collect()
 }
 
@@ -197,7 +282,8 @@ fn parts(header: &str) -> (String, Option<String>) {
         }
     }
     match header.rsplit_once(['_', '/', ',', ' ']) {
-        Some((name, inner)) => (plain(name), Some(unit(inner))),
+        // `Time in ms`.
+        Some((name, inner)) => (plain(name.strip_suffix(" in").unwrap_or(name)), Some(unit(inner))),
         None => (plain(header), None),
     }
 }
@@ -209,13 +295,25 @@ const UNKNOWN: usize = 4;
 
 fn unit(given: &str) -> String {
     // `Â` is the first half of a UTF-8 µ that was read as Latin-1.
-    let text = given.trim().replace('Â', "").to_lowercase().replace(['µ', 'μ'], "u");
+    let text = given.trim().trim_end_matches('.').replace('Â', "").to_lowercase().replace(['µ', 'μ'], "u");
     match text.as_str() {
         // Mega, not milli.
         "mn" | "mm" | "ms" | "mrad" if MEGA.contains(&given.trim()) => given.trim().to_owned(),
         "volt" | "volts" => "v".to_owned(),
-        "sec" | "seconds" => "s".to_owned(),
-        "micron" | "microns" => "um".to_owned(),
+        "sec" | "secs" | "second" | "seconds" => "s".to_owned(),
+        "msec" | "milliseconds" => "ms".to_owned(),
+        "usec" | "microseconds" => "us".to_owned(),
+        "minute" | "minutes" => "min".to_owned(),
+        "hr" | "hrs" | "hour" | "hours" => "h".to_owned(),
+        "day" | "days" => "d".to_owned(),
+        "millivolt" | "millivolts" => "mv".to_owned(),
+        "micron" | "microns" | "micrometer" | "micrometers" | "micrometre" | "micrometres" => "um".to_owned(),
+        "nanometer" | "nanometers" | "nanometre" | "nanometres" => "nm".to_owned(),
+        "millimeter" | "millimeters" | "millimetre" | "millimetres" => "mm".to_owned(),
+        "å" => "angstrom".to_owned(),
+        "inch" | "inches" => "in".to_owned(),
+        "thou" | "mils" => "mil".to_owned(),
+        "newton" | "newtons" => "n".to_owned(),
         "°" | "degree" | "degrees" => "deg".to_owned(),
         _ => text,
     }
@@ -244,6 +342,11 @@ mod tests {
             ("Position nm", "displacement_um", Some((Fit::OtherName, 1e3))),
             ("monitor_V", "drive_V", None),
             ("force_kN", "force_N", Some((Fit::OtherUnit, 1e-3))),
+            ("Zeit in ms", "time_s", Some((Fit::OtherName, 1e3))),
+            ("Time (sec.)", "time_s", Some((Fit::OtherUnit, 1.0))),
+            ("Time [min]", "time_s", Some((Fit::OtherUnit, 1.0 / 60.0))),
+            ("displacement [Å]", "displacement_um", Some((Fit::OtherUnit, 1e4))),
+            ("Position (mil)", "displacement_um", Some((Fit::OtherName, 1.0 / 25.4))),
             ("force_MN", "force_N", None),
             ("FORCE_mN", "force_N", Some((Fit::OtherUnit, 1e3))),
         ] {
@@ -255,6 +358,18 @@ mod tests {
         assert_eq!(per_denominator("CH2 (bar)", "V"), Err("bar".to_owned()));
         assert_eq!(per_denominator("CH2 (bar)", "bar"), Ok(1.0));
         assert_eq!(per_denominator("CH2 (Filtered)", "V"), Ok(1.0));
+        for (header, unit) in [
+            ("CH2 (mV)", Some("mV")),
+            ("Pos,nm", Some("nm")),
+            ("CH2 [ V ]", Some("V")),
+            ("U_mV", Some("mV")),
+            ("t [s]", Some("s")),
+            ("V_in", None),
+            ("Voltage_0", None),
+            ("Gauge (MN)", None),
+        ] {
+            assert_eq!(own_unit(header), unit, "{header}");
+        }
         for (header, at, expected) in [
             ("x (um)", 0, Some((Fit::OtherUnit, 1.0))),
             ("X_MM", 0, Some((Fit::OtherUnit, 1e-3))),
@@ -270,6 +385,6 @@ mod tests {
         assert!((Conversion::unit(per).apply(180.0) * 1e-6 - core::f64::consts::PI).abs() < 1e-12, "{per}");
         assert!(is_unit("[µm]") && is_unit("Volts") && !is_unit("1") && is_sample_number("Sample"));
         assert_eq!(quantity("drive_V").unwrap().all_names(), "`drive_V`, `drive_mV`, `drive_uV`, `drive_kV`");
-        assert_eq!(quantity("force_N").unwrap().all_names(), "`force_N`, `force_mN`, `force_kN`");
+        assert_eq!(quantity("monitor_V").unwrap().all_names(), "`monitor_V`, `monitor_mV`, `monitor_uV`, `monitor_kV`");
     }
 }

@@ -2,8 +2,9 @@
 
 use std::io::Read;
 
-use super::head::{self, Line, decoded, has_fields, is_row, names_of, number, separator_of, split};
+use super::head::{self, Line, decoded, has_fields, is_row, names_of, separator_of, split};
 use super::lines::LineReader;
+use super::number::number;
 use crate::tables::Extent;
 use specgen_language::interrupt;
 
@@ -14,13 +15,15 @@ pub(crate) struct Part {
     pub(crate) from: usize,
     /// The last row; none for the last table of a text.
     pub(crate) last: Option<usize>,
+    /// Number of its rows; 0 if they were not counted.
+    pub(crate) rows: usize,
     /// Parts between blank lines in which the first column always changes in the same direction; 0 if any does not.
     pub(crate) curves: usize,
 }
 
 impl Part {
     /// A text that is not divided.
-    pub(crate) const WHOLE: Self = Self { from: 1, last: None, curves: 0 };
+    pub(crate) const WHOLE: Self = Self { from: 1, last: None, rows: 0, curves: 0 };
 }
 
 /// Rows of a part between blank lines that are a curve.
@@ -62,7 +65,9 @@ pub(crate) fn tables(source: impl Read) -> Vec<(Part, Extent)> {
         match last {
             Some(table) if !has_fields(&line) => table.end_curve(),
             Some(table) if table.has_row(&line) => table.add(at, &line),
-            Some(table) if is_text(&line, table.separator) => between.push((at, std::mem::take(&mut line))),
+            Some(table) if is_text(&line, table.separator, table.curve.rows == 0) => {
+                between.push((at, std::mem::take(&mut line)));
+            }
             // A row with a mistake.
             Some(_) => {}
             None => match separator_of(&line).filter(|_| has_fields(&line)) {
@@ -80,12 +85,17 @@ pub(crate) fn tables(source: impl Read) -> Vec<(Part, Extent)> {
         }
     }
     let count = tables.len();
-    tables.into_iter().enumerate().map(|(k, table)| table.finish(k + 1 == count)).collect()
+    let ends = between.is_empty();
+    tables.into_iter().enumerate().map(|(k, table)| table.finish(ends && k + 1 == count)).collect()
 }
 
-/// Whether a line is about the rows below it, not a row with a mistake.
-fn is_text(line: &[u8], separator: u8) -> bool {
-    !split(line, separator).into_iter().any(|field| number(&decoded(field), separator).is_some())
+/// Whether a line is about the rows below it, or ends the table, and is not a row with a mistake: that has a number, and
+/// behind a blank line it begins with one.
+fn is_text(line: &[u8], separator: u8, is_behind_blank: bool) -> bool {
+    let is_number = |field: &&[u8]| number(&decoded(field), separator).is_some();
+    let fields = split(line, separator);
+    let count = if is_behind_blank { 1 } else { fields.len() };
+    !fields[..count].iter().any(is_number)
 }
 
 impl Open {
@@ -147,7 +157,8 @@ impl Open {
             [curves, 0, 0] | [0, curves, 0] => curves,
             _ => 0,
         };
-        (Part { last: (!is_last).then_some(self.last), curves, ..self.part }, self.extent)
+        let rows = self.extent.rows;
+        (Part { last: (!is_last).then_some(self.last), rows, curves, ..self.part }, self.extent)
     }
 }
 
@@ -175,8 +186,12 @@ mod tests {
                 (11, None, 1, "Run 2".to_owned(), names("t,U")),
             ]
         );
-        // Mistakes in rows and texts behind the last one divide nothing.
-        assert_eq!(found("t,U\n0,1\n1,x\n2,3\nend of file\n"), [(1, None, 2, String::new(), names("t,U"))]);
+        // Mistakes in rows divide nothing, and texts behind the last one end a table.
+        assert_eq!(found("t,U\n0,1\n1,x\n2,3\n"), [(1, None, 2, String::new(), names("t,U"))]);
+        for end in ["end of file\n", "\nMean,1.5\n"] {
+            let text = format!("t,U\n0,1\n1,x\n2,3\n{end}");
+            assert_eq!(found(&text), [(1, Some(4), 2, String::new(), names("t,U"))], "{end}");
+        }
         assert!(found("t,U\n0,\0\n").is_empty() && found("").is_empty());
     }
 

@@ -4,9 +4,12 @@ use hdf5_pure::{AttrValue, DType, Dataset, Error, File, Group};
 
 use super::bytes::{LONGEST_NAME, MOST_ARRAYS, Refusal, Space};
 use super::{Array, Contents};
+use crate::columns::names::with_unit;
 
 /// Classes of MATLAB that have no numbers, though they are stored as numbers.
 const NO_NUMBERS: [&str; 4] = ["char", "cell", "string", "function_handle"];
+/// Names of an attribute with the unit of a dataset.
+const UNIT: [&str; 5] = ["unit", "units", "Unit", "Units", "UNIT"];
 /// Levels of groups that are read, and number of groups: links may make a circle.
 const DEEPEST: usize = 4;
 const MOST_GROUPS: usize = 1000;
@@ -47,6 +50,9 @@ fn add(group: &Group, path: &str, depth: usize, left: &mut Left, contents: &mut 
             Some((size, values)) => {
                 let is_wide = matches!(data.dtype(), Ok(DType::I64 | DType::U64));
                 let form = (if is_wide { 'i' } else { 'f' }, 8);
+                let attributes = data.attrs().unwrap_or_default();
+                let unit = UNIT.iter().find_map(|unit| attributes.get(*unit)?.as_str());
+                let name = with_unit(&name, unit.unwrap_or_default());
                 contents.add(Array { group: path.to_owned(), name, size, values }, form);
             }
             None => contents.others.push((name, "no array of numbers that can be read".to_owned())),
@@ -128,12 +134,13 @@ mod tests {
         let mut outer = builder.create_group("scan");
         let text = outer.create_dataset("operator").with_u16_data(&[110, 111]);
         text.set_attr("MATLAB_class", AttrValue::AsciiString("char".into()));
-        outer.create_dataset("count").with_i32_data(&[7]);
+        let count = outer.create_dataset("count").with_i32_data(&[7]);
+        count.set_attr("units", AttrValue::AsciiString("mV".into()));
         outer.create_dataset("matrix").with_f64_data(&[1.0, 2.0, 3.0, 4.0, 5.0, 6.0]).with_shape(&[3, 2]);
         builder.add_group(outer.finish());
         let found = contents(builder.finish().unwrap(), u64::MAX).unwrap();
         let arrays: Vec<_> = found.arrays.iter().map(|a| (a.group.as_str(), a.name.as_str(), &a.size[..])).collect();
-        assert_eq!(arrays, [("scan", "count", &[1][..]), ("scan", "matrix", &[2, 3])]);
+        assert_eq!(arrays, [("scan", "count [mV]", &[1][..]), ("scan", "matrix", &[2, 3])]);
         assert_eq!(found.others, [("operator".to_owned(), "no array of numbers that can be read".to_owned())]);
     }
 }

@@ -12,6 +12,7 @@ use super::bytes::{
 };
 use super::{Array, Contents};
 use crate::columns::decoded;
+use crate::columns::names::with_unit;
 use specgen_language::arrays::COMMENT;
 
 /// Name of a time in s.
@@ -184,13 +185,21 @@ fn add_structs(group: &str, name: &str, fields: &[String], values: Vec<Value>, c
     let mut values = values.into_iter();
     for number in 1..=count {
         let own: Vec<(&String, Value)> = fields.iter().zip(values.by_ref()).collect();
-        let title = own.iter().find_map(|(field, value)| match value {
-            Value::Text(text) if matches!(field.as_str(), "Name" | "label") => Some(text.trim()),
-            _ => None,
-        });
-        let title = title.filter(|title| !title.is_empty() && title.len() <= LONGEST_NAME);
+        let text = |names: &[&str]| {
+            let found = own.iter().find_map(|(field, value)| match value {
+                Value::Text(text) if names.contains(&field.as_str()) => Some(text.trim()),
+                _ => None,
+            });
+            found.filter(|text| !text.is_empty() && text.len() <= LONGEST_NAME)
+        };
+        let title = text(&["Name", "label"]);
         let is_time = !group.is_empty() && name == "X" && title.is_none_or(|title| title.eq_ignore_ascii_case("time"));
-        let title = if is_time { Some(TIME) } else { title }.map(str::to_owned);
+        let title = if is_time { Some(TIME) } else { title };
+        let unit = text(&["Unit", "unit"]).unwrap_or_default();
+        let title = title.map(|title| match with_unit("time", unit) {
+            time if is_time && time != "time" => time,
+            _ => with_unit(title, unit),
+        });
         let element = if count > 1 { format!("{name}({number})") } else { name.to_owned() };
         for (field, value) in own {
             let is_data = matches!(field.as_str(), "Data" | "values");

@@ -2,7 +2,7 @@
 
 use super::{ColumnSpec, TIME};
 use crate::columns::names::{self, Conversion, Quantity};
-use crate::columns::{Column, Head};
+use crate::columns::{Column, Head, Shape};
 use crate::findings::Findings;
 use crate::reading::{ColumnChoice, Reading};
 use specgen_language::diagnostic::{Code, codes};
@@ -41,7 +41,7 @@ pub(super) fn find(header: &Head, wanted: &[ColumnSpec], reading: &Reading, find
         if matches!(found, Ok(None)) && w.required && !counted && !(w.name == DRIVE && measured) {
             missing.push(w.name);
         }
-        columns.push(found.unwrap_or_else(|(code, message, help)| findings.refuse(code, line, message, help)));
+        columns.push(found.unwrap_or_else(|(code, message, help)| findings.refuse(code, line, message, &help)));
     }
     let suggested = search.suggested(&missing, &columns);
     for name in missing {
@@ -52,7 +52,7 @@ pub(super) fn find(header: &Head, wanted: &[ColumnSpec], reading: &Reading, find
 }
 
 /// Code, message and help of a finding about the header.
-type Problem = (Code, String, &'static str);
+type Problem = (Code, String, String);
 
 struct Search<'a> {
     header: &'a Head,
@@ -73,9 +73,11 @@ impl Search<'_> {
         match found[..] {
             [(first, a, _), (second, b, _), ..] if first == second => {
                 let message = format!("column `{name}` appears twice, as columns {} and {}", a + 1, b + 1);
-                Err((codes::RECORD_COLUMN_TWICE, message, "keep one of them"))
+                let help = format!("keep one of them, or give `--columns {name}={}`", a + 1);
+                Err((codes::RECORD_COLUMN_TWICE, message, help))
             }
             [(_, at, per), ..] => Ok(Some(Column { at, name, conversion: Conversion::unit(per) })),
+            [] if name == TIME => Ok(self.header.clock().map(|at| Column::plain(at, name))),
             [] => Ok(None),
         }
     }
@@ -84,26 +86,53 @@ impl Search<'_> {
     fn chosen(&self, choice: &ColumnChoice, name: &'static str) -> Result<Column<'static>, Problem> {
         let plain = choice.conversion.and_then(|conversion| Some((self.at(&choice.column)?, conversion)));
         if let Some((at, conversion)) = plain {
+            self.check_unit(at, name, conversion)?;
             return Ok(Column { at, name, conversion });
         }
         let scaled = choice.scaled.as_ref().and_then(|scaled| Some((self.at(&scaled.column)?, scaled)));
         let Some((at, scaled)) = scaled else {
             let message = format!("`--columns` names `{}` for `{name}`; {}", choice.column, self.present());
-            return Err((codes::RECORD_HEADER, message, "name a column as the file does, or by its number from 1"));
+            let help = "name a column as the file does, or by its number from 1".to_owned();
+            return Err((codes::RECORD_HEADER, message, help));
         };
         let header = self.header.names.get(at).map_or("", String::as_str);
         let denominator = scaled.denominator.as_deref().unwrap_or_default();
         let per = names::per_denominator(header, denominator).map_err(|own| {
             let message = format!("`--columns` scales `{header}` per {denominator}, but its unit is {own}");
-            (codes::RECORD_HEADER, message, "give the factor per unit of the column")
+            (codes::RECORD_HEADER, message, "give the factor per unit of the column".to_owned())
         })?;
         Ok(Column { at, name, conversion: Conversion { per, ..scaled.conversion } })
+    }
+
+    /// The unit in the header of a column, if the user's name for it has another, and whether that is of the same kind.
+    fn other_unit(&self, at: usize, name: &str, conversion: Conversion) -> Option<(&'static str, bool)> {
+        let unit = names::own_unit(self.header.names.get(at)?)?;
+        let per = names::quantity(name)?.per(unit);
+        (per != Some(conversion.per)).then_some((unit, per.is_some()))
+    }
+
+    fn check_unit(&self, at: usize, name: &'static str, conversion: Conversion) -> Result<(), Problem> {
+        let Some((unit, is_same_kind)) = self.other_unit(at, name, conversion) else { return Ok(()) };
+        let message = format!("`--columns` names `{}` for `{name}`, but its unit is {unit}", self.header.names[at]);
+        // Every entry with the unit of its column.
+        let with_unit = |choice: &ColumnChoice| {
+            let other = choice.conversion.zip(self.at(&choice.column));
+            let other = other.filter(|(conversion, at)| self.other_unit(*at, choice.quantity, *conversion).is_some());
+            other.map_or_else(|| choice.text.clone(), |(_, at)| self.entry(choice.quantity, at))
+        };
+        let all: Vec<String> = self.reading.chosen().map(with_unit).collect();
+        let rest = if is_same_kind { "" } else { " with the size of its unit in place of 1" };
+        let help = format!("give `--columns {}`{rest}", shell::quoted(&all.join(",")));
+        Err((codes::RECORD_HEADER, message, help))
     }
 
     /// The place of the column with this name, or else this number.
     fn at(&self, column: &str) -> Option<usize> {
         let names = &self.header.names;
-        let named = names.iter().position(|header| header.eq_ignore_ascii_case(column));
+        let place = |of: fn(&str) -> &str| names.iter().position(|header| of(header).eq_ignore_ascii_case(column));
+        // The unit may come from another line.
+        let named =
+            place(|header| header).or_else(|| place(|header| header.rsplit_once(" [").map_or(header, |it| it.0)));
         let numbered = || column.parse::<usize>().ok().and_then(|number| number.checked_sub(1));
         // In a file without names, any line shows whether it is long enough.
         named.or_else(|| numbered().filter(|at| names.is_empty() || *at < names.len()))
@@ -145,42 +174,82 @@ impl Search<'_> {
         }
     }
 
-    /// Options that assign a column to each of the `missing` quantities: one of a similar name, or else the next with
-    /// numbers that is free. None if there are too few.
+    /// Options that assign a column to each of the `missing` quantities. None if there are too few.
     fn suggested(&self, missing: &[&'static str], found: &[Option<Column>]) -> Option<String> {
-        let is_taken = |at: &usize| found.iter().flatten().any(|column| column.at == *at);
-        let is_sample = |at: &usize| self.header.names.get(*at).is_some_and(|name| names::is_sample_number(name));
-        let mut free: Vec<usize> = self.header.filled.clone();
-        free.retain(|at| !is_taken(at) && !is_sample(at));
+        let is_taken = |at: usize| found.iter().flatten().any(|column| column.at == at);
+        let is_sample = |at: usize| self.header.names.get(at).is_some_and(|name| names::is_sample_number(name));
+        let mut free: Vec<(usize, Shape)> = self.header.filled.clone();
+        free.retain(|(at, _)| !is_taken(*at) && !is_sample(*at));
         let counts_samples = self.header.names.iter().any(|name| names::is_sample_number(name));
-        let rate = missing.contains(&TIME) && (counts_samples || free.len() < missing.len());
-        let missing: Vec<_> = missing.iter().copied().filter(|name| !(rate && *name == TIME)).collect();
-        let mut places: Vec<Option<usize>> = Vec::new();
-        for &name in &missing {
-            let place = self.near(name).filter(|at| free.contains(at));
-            free.retain(|at| Some(*at) != place);
-            places.push(place);
+        let is_time = |at: usize| self.resemblance(TIME, at) > 0;
+        let few = free.len() < missing.len() && !free.iter().any(|(at, _)| is_time(*at));
+        let mut rate = missing.contains(&TIME) && (counts_samples || few);
+        let mut entries = Vec::new();
+        for &name in missing {
+            if rate && name == TIME {
+                continue;
+            }
+            let of = |(at, shape): &(usize, Shape)| (self.likelihood(name, *at, *shape), *at);
+            // The first of equals.
+            let other = free.iter().filter(|(at, _)| name == TIME || !is_time(*at));
+            let best = other.map(of).rev().max_by_key(|(likelihood, _)| *likelihood);
+            match best {
+                Some((likelihood, _)) if name == TIME && likelihood < 0 => rate = true,
+                Some((_, at)) => {
+                    free.retain(|(other, _)| *other != at);
+                    entries.push(self.entry(name, at));
+                }
+                None => return None,
+            }
         }
-        let mut free = free.into_iter();
-        let entries: Option<Vec<String>> = missing
-            .iter()
-            .zip(places)
-            .map(|(&name, place)| Some(self.entry(name, place.or_else(|| free.next())?)))
-            .collect();
-        let entries = entries?;
-        let kept: Vec<String> = self.reading.given().map(str::to_owned).chain(entries).collect();
+        let kept: Vec<String> = self.reading.chosen().map(|choice| choice.text.clone()).chain(entries).collect();
         let columns = shell::quoted(&kept.join(","));
         let options =
             [(!kept.is_empty()).then(|| format!("--columns {columns}")), rate.then(|| "--rate HZ".to_owned())];
         Some(options.into_iter().flatten().collect::<Vec<_>>().join(" ")).filter(|options| !options.is_empty())
     }
 
-    /// The entry of `--columns` for a quantity in a column. If its unit is not known, it gets a factor of 1.
-    fn entry(&self, name: &'static str, at: usize) -> String {
+    /// How likely a column holds the quantity `name`: by its name, its unit, and its first samples.
+    fn likelihood(&self, name: &'static str, at: usize, shape: Shape) -> i32 {
+        let header = self.header.names.get(at).map_or("", String::as_str);
+        let Some(quantity) = names::quantity(name) else { return 0 };
+        let by_name = if self.near(name) == Some(at) { 100 } else { 40 * self.resemblance(name, at) };
+        let by_unit = match names::own_unit(header) {
+            Some(unit) if quantity.per(unit).is_some() => 30,
+            Some(_) => -40,
+            None if name == TIME && names::has_unknown_unit(header) => -40,
+            None => 0,
+        };
+        let by_samples = match shape {
+            Shape::Rising | Shape::Clock if name == TIME => 20,
+            Shape::Unknown => 0,
+            Shape::Counting | Shape::Other if name == TIME => -200,
+            Shape::Constant | Shape::Clock => -200,
+            Shape::Counting => -100,
+            Shape::Rising | Shape::Other => 0,
+        };
+        by_name + by_unit + by_samples
+    }
+
+    /// Whether the name of a column has a word for the quantity `name` (1), for another one (-1), or neither (0).
+    fn resemblance(&self, name: &str, at: usize) -> i32 {
         let header = self.header.names.get(at);
-        match names::quantity(name).filter(|quantity| header.is_some_and(|header| has_other_unit(header, quantity))) {
-            Some(quantity) => format!("{}={}*1 {}", quantity.plain(), self.word(at), quantity.unit()),
-            None => format!("{name}={}", self.word(at)),
+        header.and_then(|header| Some(names::quantity(name)?.resemblance(header))).unwrap_or_default()
+    }
+
+    /// The entry of `--columns` for a quantity in a column, with the unit of the column. If that is of another quantity,
+    /// or not known, it gets a factor of 1.
+    fn entry(&self, name: &'static str, at: usize) -> String {
+        let header = self.header.names.get(at).map_or("", String::as_str);
+        let Some(quantity) = names::quantity(name) else { return String::new() };
+        let (plain, word) = (quantity.plain(), self.word(at));
+        match names::own_unit(header) {
+            Some(unit) if quantity.per(unit).is_some() => format!("{plain}_{unit}={word}"),
+            Some(unit) => format!("{plain}={word}*1 {}/{unit}", quantity.unit()),
+            None if has_other_unit(header, quantity) || names::has_unknown_unit(header) => {
+                format!("{plain}={word}*1 {}", quantity.unit())
+            }
+            None => format!("{name}={word}"),
         }
     }
 
@@ -198,8 +267,12 @@ impl Search<'_> {
     fn near(&self, name: &'static str) -> Option<usize> {
         let plain = names::quantity(name)?.plain();
         let lower = name.to_ascii_lowercase();
+        // Of another quantity.
         let taken = |header: &str| {
-            self.wanted.iter().any(|w| names::quantity(w.name).is_some_and(|q| q.fits(header).is_some()))
+            self.wanted
+                .iter()
+                .filter_map(|w| names::quantity(w.name))
+                .any(|q| q.fits(header).is_some() || q.plain() != plain && q.is_named(header))
         };
         let headers = self.header.names.iter().enumerate();
         headers
@@ -213,7 +286,9 @@ impl Search<'_> {
     /// How to provide the column `name`; `suggested` are options that do.
     fn help(&self, name: &'static str, suggested: Option<&str>) -> String {
         let names = &self.header.names;
-        let or_give = suggested.map(|options| format!(", or give `{options}`")).unwrap_or_default();
+        let size =
+            |options: &str| if options.contains("*1 ") { " with the size of its unit in place of 1" } else { "" };
+        let or_give = suggested.map(|given| format!(", or give `{given}`{}", size(given))).unwrap_or_default();
         if names.is_empty() {
             let wanted: Vec<&str> = self.wanted.iter().filter(|w| w.required).map(|w| w.name).collect();
             return format!("the first line must be the header `{}`{or_give}", wanted.join(","));
@@ -224,9 +299,8 @@ impl Search<'_> {
         let Some(quantity) = names::quantity(name) else { return String::new() };
         match self.near(name).map(|at| &names[at]) {
             Some(header) if has_other_unit(header, quantity) => {
-                let size = suggested.map(|_| " with the size of its unit in place of 1").unwrap_or_default();
                 let all = quantity.all_names();
-                format!("the unit of `{header}` is not known: convert it to one of {all}{or_give}{size}")
+                format!("the unit of `{header}` is not known: convert it to one of {all}{or_give}")
             }
             Some(header) => format!("rename `{header}` to `{name}` if that is what it holds{or_give}"),
             None => format!("name the column that holds it `{name}`; the unit is part of the name{or_give}"),
@@ -261,13 +335,27 @@ mod tests {
     fn suggestions_assign_every_missing_column() {
         for (text, options) in [
             ("tme_s,U,y\n0,1,2\n", "`--columns time_s=tme_s,drive_V=U,displacement_um=y`"),
-            ("Time,s;Ch 1,V;Ch2,V\n0;1;2\n", "`--columns 'drive_V=Ch 1,V,displacement_um=Ch2,V'`"),
+            ("Time,s;Ch 1,V;Ch2,V\n0;1;2\n", "`--columns 'drive_V=Ch 1,V,displacement=Ch2,V*1 um/V'`"),
+            ("Time,s;Ch1 [m];Ch2,mV\n0;1;2\n", "`--columns 'drive_mV=Ch2,mV,displacement_m=Ch1 [m]'`"),
+            ("time_s,drive_V,gauge_V\n0,1,2\n", "`--columns 'displacement=gauge_V*1 um/V'`"),
+            (
+                "No.,Sensor,Voltage,Start [d]\n0,3,4,0.1\n",
+                "`--columns 'time_d=Start [d],drive_V=Voltage,displacement_um=Sensor'`",
+            ),
+            ("a,b,c\n4,0,.5\n3,0,.7\n2,0,.9\n", "`--columns time_s=c,drive_V=a,displacement_um=b`"),
+            ("X,CH1,CH2 [V]\n0,5,1\n1,7,2\n2,5,4\n", "`--columns 'drive_V=CH2 [V],displacement_um=CH1' --rate HZ`"),
+            (
+                "a,H (Oe),M (emu)\n0,5,1\n1,7,2\n2,5,4\n",
+                "`--columns 'drive=H (Oe)*1 V,displacement=M (emu)*1 um' --rate HZ`",
+            ),
+            ("a,b,c\n4,5,0\n3,7,0\n2,5,0\n", "`--columns drive_V=a,displacement_um=b --rate HZ`"),
+            ("X_Value,Voltage,Weg\n0,0,0\n1,1,0\n2,0,0\n", "`--columns drive_V=Voltage,displacement_um=Weg`"),
             (",0,1,2\n", "`--columns time_s=2,drive_V=3,displacement_um=4`"),
             ("\u{a0}a;U;y\n0;1;2\n", "`--columns time_s=1,drive_V=U,displacement_um=y`"),
             (";a;a;x=1\n7;1;2;3\n", "`--columns time_s=1,drive_V=a,displacement_um=3`"),
             ("a,b\n1,2\n", "`--columns drive_V=a,displacement_um=b --rate HZ`"),
             ("sample,a,b\n0,1,2\n", "`--columns drive_V=a,displacement_um=b --rate HZ`"),
-            ("time_s,drive_V,displacement_in\n0,1,2\n", "`--columns 'displacement=displacement_in*1 um'`"),
+            ("time_s,drive_V,displacement_ft\n0,1,2\n", "`--columns 'displacement=displacement_ft*1 um'`"),
         ] {
             let all = found(text, &Reading::default()).unwrap_err();
             assert!(all.iter().all(|one| one.contains(options)), "{text}: {all:?}");
@@ -275,6 +363,12 @@ mod tests {
         let some = Reading::new(&["drive_V=b".to_owned()], None).unwrap();
         let all = found("a,b,c\n1,2,3\n", &some).unwrap_err();
         assert!(all[0].contains("--columns drive_V=b,time_s=a,displacement_um=c"), "{all:?}");
+    }
+
+    #[test]
+    fn without_a_column_for_each_quantity_nothing_is_suggested() {
+        let all = found("Time,Ampl\n0,5\n1,7\n2,5\n", &Reading::default()).unwrap_err();
+        assert!(all.iter().all(|one| !one.contains("--columns")), "{all:?}");
     }
 
     fn found(text: &str, reading: &Reading) -> Result<Vec<Option<usize>>, Vec<String>> {
@@ -301,7 +395,7 @@ mod tests {
     fn near_misses_units_and_numbers_get_their_own_advice() {
         let help = |header: &str| found(header, &Reading::default()).unwrap_err()[0].clone();
         assert!(help("tme_s,drive_V,displacement_um").contains("rename `tme_s` to `time_s`"));
-        assert!(help("time_s,drive_V,displacement_inch").contains("`displacement_um`, `displacement_nm`"));
+        assert!(help("time_s,drive_V,displacement_foot").contains("`displacement_um`, `displacement_nm`"));
         assert!(help("time_s,drive_V,displacement").contains("rename `displacement` to `displacement_um`"));
         assert!(help("0.0,1.0,2.0").contains("first line must be the header"));
         assert!(help("sample,drive_V,displacement_um").contains("--rate HZ"));

@@ -86,7 +86,12 @@ fn joints(text: &str) -> Result<[[[f64; 3]; 6]; 2], Refusal> {
     let Some((first, names)) = lines.next() else {
         return refuse(1, "the file is empty".to_owned(), format!("begin with a head such as {EXAMPLE}"));
     };
-    let mut head = Head::of(first, names)?;
+    // A line without a digit has units.
+    let units = lines.clone().next().map(|(_, line)| line).filter(|line| !line.contains(|c: char| c.is_ascii_digit()));
+    let mut head = Head::of(first, names, units.unwrap_or_default())?;
+    if units.is_some() {
+        lines.next();
+    }
     // Beside decimal points a comma would divide thousands.
     head.has_commas = head.separator != ',' && !lines.clone().any(|(_, line)| line.contains('.'));
     let mut found = lines.map(|(line, text)| head.joint(line, text)).collect::<Result<Vec<Joint>, Refusal>>()?;
@@ -110,9 +115,14 @@ fn joints(text: &str) -> Result<[[[f64; 3]; 6]; 2], Refusal> {
 fn of_body(all: &[Joint], is_platform: bool) -> Result<[[f64; 3]; 6], Refusal> {
     let own: Vec<&Joint> = all.iter().filter(|joint| joint.is_platform == Some(is_platform)).collect();
     let name = if is_platform { "platform" } else { "base" };
+    if own.len() != 6 {
+        let message = format!("there are {} joints of the {name}, expected 6", own.len());
+        let help = "write base or platform, or B0 to B5 and P0 to P5".to_owned();
+        return Err(Refusal { line: None, message, help });
+    }
     let numbers: Vec<i64> = own.iter().enumerate().map(|(at, joint)| joint.leg.unwrap_or(at as i64)).collect();
-    // Legs count from 0; many lists count from 1.
-    let from = i64::from(!numbers.contains(&0));
+    // Legs count from 0; many lists count from 1, and those of the platform go on.
+    let from = i64::from(!numbers.contains(&0)) + if numbers.iter().all(|number| *number > 6) { 6 } else { 0 };
     let of_leg = |leg: i64| own.iter().zip(&numbers).filter(move |(_, number)| **number == leg + from);
     let mut points = [[0.0; 3]; 6];
     for (point, leg) in points.iter_mut().zip(0..) {
@@ -135,13 +145,17 @@ fn of_body(all: &[Joint], is_platform: bool) -> Result<[[f64; 3]; 6], Refusal> {
 }
 
 fn cells(line: &str, separator: char) -> Vec<&str> {
+    if separator == ' ' {
+        return line.split_whitespace().map(|cell| cell.trim_matches('"')).collect();
+    }
     line.split(separator).map(|cell| cell.trim().trim_matches('"').trim()).collect()
 }
 
 impl<'a> Head<'a> {
-    fn of(line: usize, names: &'a str) -> Result<Self, Refusal> {
-        let separator = ['\t', ';'].into_iter().find(|separator| names.contains(*separator)).unwrap_or(',');
-        let names = cells(names, separator);
+    /// `units`: the line below, if it has them.
+    fn of(line: usize, names: &'a str, units: &'a str) -> Result<Self, Refusal> {
+        let separator = ['\t', ';', ','].into_iter().find(|separator| names.contains(*separator)).unwrap_or(' ');
+        let (names, units) = (cells(names, separator), cells(units, separator));
         // The clearest name first.
         let called =
             |known: &[&str]| known.iter().find_map(|one| names.iter().position(|name| name.to_lowercase() == *one));
@@ -149,7 +163,9 @@ impl<'a> Head<'a> {
             let found = names.iter().enumerate().find_map(|(at, name)| {
                 let unit = name.strip_prefix([axis, axis.to_ascii_uppercase()])?;
                 let is_name = !unit.starts_with(char::is_alphanumeric);
-                is_name.then(|| (at, unit.trim_matches(|c: char| c.is_whitespace() || "_[]()/,.".contains(c))))
+                let plain = |unit: &'a str| unit.trim_matches(|c: char| c.is_whitespace() || "_[]()/,.".contains(c));
+                let below = units.get(at).copied().unwrap_or_default();
+                is_name.then(|| (at, [unit, below].map(plain).into_iter().find(|unit| !unit.is_empty()).unwrap_or("")))
             });
             let head = format!("write the names and the unit in the first line: {EXAMPLE}");
             let Some((at, unit)) = found else {
@@ -190,6 +206,10 @@ impl<'a> Head<'a> {
             let name = cell(at);
             name.split_at(name.trim_end_matches(|c: char| c.is_ascii_digit()).len())
         });
+        // `Base_A` to `Base_F`.
+        let letter = name.rsplit_once(['_', ' ', '-']).filter(|_| number.is_empty()).map(|(_, letter)| letter);
+        let letter = letter
+            .and_then(|letter| ["a", "b", "c", "d", "e", "f"].iter().position(|one| letter.eq_ignore_ascii_case(one)));
         let plain = name.trim_end_matches([' ', '_', '-']).to_lowercase();
         let is = |(words, letter): (&[&str], char)| {
             words.iter().any(|word| plain.starts_with(word)) || plain.chars().eq([letter])
@@ -204,7 +224,7 @@ impl<'a> Head<'a> {
             }
         };
         let given = self.leg.map_or(number, cell);
-        let leg = given.parse().ok();
+        let leg = given.parse().ok().or(letter.map(|letter| letter as i64));
         if leg.is_none() && (self.leg.is_some() || !given.is_empty()) {
             let message = format!("`{}` is no number of a leg", text::shorten(given));
             return refuse(line, message, "number the legs from 0 to 5, or from 1 to 6");
@@ -270,6 +290,24 @@ mod tests {
                 file("joint,where,x_mm,y_mm,z_mm", 0, |leg, top, [x, y, z]| format!("{leg},{},{x},{y},{z}", body(top))),
             ),
             (
+                "units below, platform from 7",
+                file("\"Joint\",X,Y,Z\n,[mm],[mm],[mm]", 1, |leg, top, [x, y, z]| {
+                    format!("{} {},{x},{y},{z}", body(top), leg + if top { 6 } else { 0 })
+                }),
+            ),
+            (
+                "blanks",
+                file("name  x_mm  y_mm  z_mm", 1, |leg, top, point| {
+                    format!("{}{leg}   {}", if top { "P" } else { "B" }, point.join(" "))
+                }),
+            ),
+            (
+                "letters, reversed",
+                turned(file("name,x_mm,y_mm,z_mm", 0, |leg, top, [x, y, z]| {
+                    format!("{}_{},{x},{y},{z}", body(top), ["A", "B", "C", "D", "E", "F"][leg])
+                })),
+            ),
+            (
                 "metres",
                 file("# CAD\nleg,where,x_m,y_m,z_m", 0, |leg, top, point| {
                     format!("{leg},{},{}", body(top), point.map(|v| v + "e-3").join(","))
@@ -295,7 +333,7 @@ mod tests {
             (plain.replace("0,base", "first,base"), Some(2), "`first` is no number"),
             (plain.replace("0,base", "0,arm"), Some(2), "`arm` is neither"),
             (plain.replace("1,base", "2,base"), None, "the base has no joint of leg 1"),
-            (plain.replace("5,base", "5,platform"), None, "the base has no joint of leg 5"),
+            (plain.replace("5,base", "5,platform"), None, "there are 5 joints of the base"),
             (plain.replace("0,base", "0,machine"), Some(2), "`machine` is neither"),
             (plain.replace("0,base,150", "0,base,150,5"), Some(2), "more cells than"),
             (plain.replace("0,base,150", "0,base,\"150,5\""), Some(2), "more cells than"),

@@ -51,7 +51,7 @@ const LABVIEW: &str = "LabVIEW Measurement\t\nSeparator\tTab\nDecimal_Separator\
 fn every_kind_of_text_gives_the_same_record() {
     let names = "X_Value\tVoltage\tVoltage (Filtered)\tComment";
     let by_name: &[&str] = &["drive_V=Voltage", "displacement_um=Voltage (Filtered)"];
-    let lines: [(&str, String, &[&str], Option<f64>); 12] = [
+    let lines: [(&str, String, &[&str], Option<f64>); 22] = [
         ("plain", file("time_s,drive_V,displacement_um", |[t, u, y]| format!("{t},{u},{y}")), &[], None),
         (
             "semicolons, decimal commas, other units and order",
@@ -105,13 +105,84 @@ fn every_kind_of_text_gives_the_same_record() {
             &[],
             Some(1e3),
         ),
+        (
+            "a rule below the names",
+            file("| time_s | drive_V | displacement_nm |\n|---|---|---|", |[t, u, y]| {
+                format!("| {t} | {u} | {:?} |", 1e3 * y)
+            }),
+            &[],
+            None,
+        ),
+        (
+            "units above the names",
+            file("ms\tV\tnm\nTime\tDrive\tPosition", |[t, u, y]| format!("{:?}\t{u}\t{:?}", 1e3 * t, 1e3 * y)),
+            &[],
+            None,
+        ),
+        (
+            "blanks in names",
+            file("# Time (ms)   Drive [ V ]   Position (um)", |[t, u, y]| format!("{:?}   {u}  {y}", 1e3 * t)),
+            &[],
+            None,
+        ),
+        (
+            "names in a comment, one of them known",
+            file("% by hand\n%t [s],U (mV),Weg (nm)", |[t, u, y]| format!("{t},{:?},{:?}", 1e3 * u, 1e3 * y)),
+            &["drive_mV=2", "displacement_nm=Weg (nm)"],
+            None,
+        ),
+        (
+            "names of two words",
+            file("Elapsed time  Amplifier  Position sensor", |[t, u, y]| format!("{t}  {u}  {y}")),
+            &["time_s=Elapsed time", "drive_V=2", "displacement_um=Position sensor"],
+            None,
+        ),
+        (
+            "an oscilloscope's interval",
+            file("X,CH1,CH2,Start,Increment,\nSequence,Volt,Volt,0.0,1e-3", |[t, u, y]| {
+                format!("{},{u},{y},", 1e3 * t)
+            }),
+            &["drive_V=CH1", "displacement=CH2*1 um/V"],
+            None,
+        ),
+        (
+            "an interval in the preamble",
+            file("# DIM = 2\n# SAMPLE_TIME = 0.001\n# END_HEADER", |[_, u, y]| format!("{u} {y} ")),
+            &["drive_V=1", "displacement_um=2"],
+            None,
+        ),
+        (
+            "dates and times over midnight",
+            file("Timestamp,drive_V,displacement_um", |[t, u, y]| {
+                let (day, seconds) = if t < 0.1 { (4, 59.9 + t) } else { (5, t - 0.1) };
+                let clock = if day == 4 { "23:59" } else { "00:00" };
+                format!("2024-03-0{day}T{clock}:{seconds:06.3}Z,{u},{y}")
+            }),
+            &["time_s=1"],
+            None,
+        ),
+        (
+            "a last line",
+            file("time_s;drive_V;displacement_um", |row| row.map(comma).join(";")) + "\nMean;1,5;2\nEnd of file\n",
+            &[],
+            None,
+        ),
+        (
+            "exponents of Fortran",
+            file("time_s drive_V displacement_um", |row| {
+                row.map(|value| format!("{value:.9e}").replace('e', "D")).join(" ")
+            }),
+            &[],
+            None,
+        ),
         ("a note", file("time_s,note,drive_V,displacement_um", |[t, u, y]| format!("{t},a,{u},{y},b")), &[], None),
     ];
     for (name, text, columns, rate) in lines {
         let record = assert_same(name, read(text.as_bytes(), columns, rate));
         assert!(!record.monitored && record.warnings.is_empty(), "{name}: {:?}", record.warnings);
-        let windows = text.replace('\n', "\r\n");
-        assert_same(name, read(windows.as_bytes(), columns, rate));
+        for end in ["\r\n", "\r"] {
+            assert_same(name, read(text.replace('\n', end).as_bytes(), columns, rate));
+        }
     }
     let latin: Vec<u8> = file("time_s,monitor_V,displacement_?m", |[t, u, y]| format!("{t},{u},{y}"))
         .bytes()
@@ -151,7 +222,7 @@ fn what_is_refused_says_what_is_then_taken() {
             None,
         ),
         (
-            &plain("time_s,drive_V,displacement_inch"),
+            &plain("time_s,drive_V,displacement_foot"),
             "E0504",
             "`displacement_um`",
             plain("time_s,drive_V,displacement_um"),
@@ -188,7 +259,13 @@ fn what_is_refused_says_what_is_then_taken() {
         (b"\x89HDF\r\n\x1a\n", "cannot be read", "arrays of numbers"),
         (b"TDSm\x0e\0\0\0", "damaged or cut off", "arrays of numbers"),
         (b"\x93NUMPY\x01\0", "damaged or cut off", "arrays of numbers"),
-        (b"PK\x03\x04", "a ZIP archive", "as CSV"),
+        (b"PK\x03\x04", "a ZIP archive", "unpack it"),
+        (&[b"PK\x03\x04", &[0; 26][..], b"[Content_Types].xml"].concat(), "a spreadsheet", "as CSV"),
+        (b"\0\0\0\0\x41\x02\0\0\x01\0\0\0\0\0\0\0\x07\0\0\0time_s\0", "MAT-file of version 4", "'-v7'"),
+        (b"BZh91AY", "packed by bzip2", "unpack it"),
+        (b"\xfd7zXZ\0", "packed by xz", "unpack it"),
+        (b"{\"time_s\": [0, 1]}", "JSON", "as CSV"),
+        (b"%PDF-1.4\n%", "a PDF document", "as CSV"),
         (b"\x1f\x8b\x08", "cannot be unpacked", "copy the file again"),
         (b"\xff\xfet\0\n", "odd number of bytes", "copy the file again"),
     ] {
@@ -215,8 +292,7 @@ fn files_of_matlab_hdf5_and_tdms_are_the_same_record() {
         assert_eq!(bits(&record.displacement), wanted(2, 1e-6), "{name}");
     }
     // Other names are named as in a text.
-    let reading =
-        Reading::new(&["drive_V=displacement_um".to_owned(), "displacement_um=drive_V".to_owned()], None).unwrap();
+    let reading = Reading::new(&["drive=displacement_um*1 V/um,displacement=drive_V*1 um/V".to_owned()], None).unwrap();
     let swapped = read_record(&containers().join("v5.mat"), "v5.mat", &reading).unwrap();
     assert_eq!(swapped.drive[7].to_bits(), rows()[7][2].to_bits());
 }

@@ -37,6 +37,42 @@ fn structs_of_dspace_are_read() {
     assert!(record.warnings.is_empty(), "{:?}", record.warnings);
     let found = read(&mat::file(&[whole]), &[], None).unwrap_err();
     assert!(found[0].message.contains("`Model Root/Drive`"), "{found:?}");
+    // Units beside the names are part of the suggestion.
+    let nanometres: Vec<f64> = values(2).iter().map(|value| 1e3 * value).collect();
+    let signal = |name: &str, unit: &str, values: &[f64]| {
+        vec![text("", name), doubles("", [1, 240], values), text("", unit), text("", "a remark")]
+    };
+    let signals = [signal("Amp/Out", "V", &values(1)), signal("Gauge/Out", "nm", &nanometres)];
+    let y = structs("", &["Name", "Data", "Unit", "Description"], &signals);
+    let milliseconds: Vec<f64> = values(0).iter().map(|value| 1e3 * value).collect();
+    let x = structs("", &["Data", "Unit"], &[vec![doubles("", [1, 240], &milliseconds), text("", "ms")]]);
+    let file = mat::file(&[structs("exp", &["X", "Y"], &[vec![x, y]])]);
+    let found = read(&file, &[], None).unwrap_err();
+    assert!(found[0].help.contains("'drive_V=Amp/Out [V],displacement_nm=Gauge/Out [nm]'"), "{found:?}");
+    assert_same("units", read(&file, &["drive_V=Amp/Out", "displacement_nm=Gauge/Out [nm]"], None));
+}
+
+/// A struct with times for each signal, as Simulink saves them.
+#[test]
+fn signals_with_the_same_times_are_one_table() {
+    for labels in [["drive_V", "displacement_um"], ["", ""]] {
+        let file = |scale: f64| {
+            let signal = |name: &str, label: &str, k: usize| {
+                let inner = [vec![column("", &values(k)), text("", label)]];
+                let inner = structs("", &["values", "label"], &inner);
+                let times: Vec<f64> = values(0).iter().map(|time| if k == 1 { scale * time } else { *time }).collect();
+                structs(name, &["time", "signals"], &[vec![column("", &times), inner]])
+            };
+            mat::file(&[signal("amp", labels[0], 1), signal("gauge", labels[1], 2)])
+        };
+        let names: &[&str] = match labels[0] {
+            "" => &["time_s=time", "drive_V=amp.signals.values", "displacement_um=gauge.signals.values"],
+            _ => &["time_s=time"],
+        };
+        let record = assert_same("one table", read(&file(1.0), names, None));
+        assert!(record.warnings.is_empty(), "{:?}", record.warnings);
+        assert!(read(&file(2.0), names, None).is_err());
+    }
 }
 
 #[test]
@@ -96,6 +132,8 @@ fn numpy_gzip_and_utf_16_are_read() {
     };
     assert_same("UTF-16, low byte first", read(&utf16(u16::to_le_bytes), &[], None));
     assert_same("UTF-16, high byte first", read(&utf16(u16::to_be_bytes), &[], None));
+    assert_same("UTF-16 without mark", read(&utf16(u16::to_le_bytes)[2..], &[], None));
+    assert_same("UTF-16 without mark, high byte first", read(&utf16(u16::to_be_bytes)[2..], &[], None));
     let npy = |descr: &str, shape: &str, values: &[u8]| {
         let header = format!("{{'descr': {descr}, 'fortran_order': False, 'shape': {shape}, }}\n");
         [b"\x93NUMPY\x01\0", &(header.len() as u16).to_le_bytes()[..], header.as_bytes(), values].concat()
@@ -115,6 +153,12 @@ fn a_scaled_gauge_is_read() {
     for scale in ["displacement=CH2 (mV)*5 um/V+0.3 um", "displacement=3*5 um/V+300 nm", "displacement_nm=y*1e3"] {
         assert_same(scale, read(volts.as_bytes(), &[scale], None));
     }
+    for (wrong, help) in
+        [("drive_V=CH2 (mV)", "drive_mV=CH2 (mV)"), ("displacement_um=CH2 (mV)", "displacement=CH2 (mV)*1 um/mV")]
+    {
+        let found = read(volts.as_bytes(), &[wrong], None).unwrap_err();
+        assert!(found.iter().any(|one| one.code == "E0504" && one.help.contains(help)), "{found:?}");
+    }
     let found = read(volts.as_bytes(), &["displacement=CH2 (mV)*5 um/N"], None).unwrap_err();
     assert!(found[0].message.contains("its unit is mv"), "{found:?}");
 }
@@ -132,6 +176,9 @@ fn the_data_table_of_a_text_is_found() {
     let list = "time_s=t,drive_V=U,displacement_um=y";
     let longest = assert_same("longest", read(all.as_bytes(), &[list], None));
     assert!(note(&longest).contains("table 3 `Run` (240 rows"), "{}", note(&longest));
+    let lines = (0..3).map(|k| values(k).iter().map(f64::to_string).collect::<Vec<_>>().join("\t")).collect::<Vec<_>>();
+    let found = read(lines.join("\n").as_bytes(), &[], None).unwrap_err();
+    assert!(found[0].message.contains("3 lines of 240 numbers: rows and columns are exchanged"), "{found:?}");
     let fourth = read_as(all.as_bytes(), &series(list, "4")).unwrap();
     assert_eq!((fourth.time.len(), fourth.time[0], fourth.warnings.len()), (141, 0.099, 0));
 }
