@@ -11,7 +11,7 @@ use host_sim::scenario::{LegScenario, MODES};
 use specgen::everett::EverettTable;
 use specgen::identify::leg_model::{Around, LegModel, WidenedPlays};
 use specgen::identify::rate::{RateIdentification, RateModel, RateOption, identify_rate, spec_lines, write_rate_csv};
-use specgen::identify::{Options, Record, identify, parse_record, write_leg_csv, write_table_csv};
+use specgen::identify::{Options, Record, identify, parse_record, read_leg_csv, write_leg_csv, write_table_csv};
 use specgen::model::Mcu;
 use specgen::target::Image;
 use specgen::verify;
@@ -175,6 +175,38 @@ fn both_options_of_a_platform_are_equal_in_every_bit() {
         equal_bits("rate-creep-platform", "reference.toml", &[("memory  = 64", &creep)], &[Mcu::Mps2An500], false);
     }
     equal_bits("rate-dynamic-platform", "reference.toml", &[("memory  = 64", DYNAMIC)], &[Mcu::Mps2An500], true);
+}
+
+#[test]
+fn a_file_of_plays_is_checked_its_table_made_again_and_its_gain_refitted() {
+    let text = widened_leg();
+    let read = |text: &str| read_leg_csv(text, "plays.csv");
+    let leg = read(&text).unwrap();
+    let around = leg.around.clone().unwrap();
+    let sum = |around: &Around| around.plays.as_ref().unwrap().weights.iter().sum::<f64>();
+    assert!((sum(&around.refitted(1.1, 0.0).unwrap()) / sum(&around) - 1.1).abs() < 1e-12);
+    // The table follows from the plays, whatever the rows say.
+    let double = |line: &str| match line.rsplit_once(',') {
+        Some((cell, value)) if !line.starts_with('#') && !line.starts_with('u') => {
+            format!("{cell},{}", 2.0 * value.parse::<f64>().unwrap())
+        }
+        _ => line.to_owned(),
+    };
+    let doubled = text.lines().map(double).collect::<Vec<_>>().join("\n");
+    assert!(doubled != text);
+    assert_eq!(read(&doubled).unwrap().table.nodes, leg.table.nodes);
+    for (from, to) in [
+        ("\"kappa\":0.02", "\"kappa\":2"),
+        ("\"v0_V_per_s\":20.0", "\"v0_V_per_s\":1e-310"),
+        ("\"lag_s\":0.002", "\"lag_s\":1e12"),
+        ("um_per_V\":[0.44", "um_per_V\":[1e-9"),
+        ("_V\":[0.0,2.0,", "_V\":[0.0,6.0,"),
+        ("\"slope_um_per_V\":0.0,\"beta_per_V\":0.0", "\"slope_um_per_V\":0.1,\"beta_per_V\":0.1"),
+    ] {
+        let changed = text.replacen(from, to, 1);
+        assert!(changed != text, "{from}");
+        assert!(read(&changed).unwrap_err()[0].message.contains("plays are expected"), "{to}");
+    }
 }
 
 /// Without the option nothing of it is emitted: a controller whose rate model is empty is the static one, tick for tick.

@@ -30,7 +30,7 @@ use crate::staircase::saturate;
 pub use families::{Choice, FamilyScore, Selection, choose};
 pub use family::Family;
 pub(crate) use family::TIMES;
-use family::WIDENED_PLAYS;
+pub use family::WIDENED_PLAYS;
 pub use file::{read_leg_csv, write_leg_csv};
 
 /// Number of coefficients of a read-out: powers 1 to 5.
@@ -127,7 +127,7 @@ impl WidenedPlays {
         }
     }
 
-    /// Their Everett table at rest: a play gains what a rise goes on after twice its threshold.
+    /// Their Everett table at rest: a play moves by the part of a rise beyond twice its threshold.
     fn table(&self, plane: &Plane) -> EverettTable {
         let Plane { grid, range: [drive_min, drive_max] } = *plane;
         let cell = (drive_max - drive_min) / grid as f64;
@@ -139,16 +139,20 @@ impl WidenedPlays {
         EverettTable { grid, drive_min, drive_max, nodes: spans.map(gained).collect() }
     }
 
-    /// Whether a controller can use them.
+    /// Whether a controller can use them, in single precision, too.
     fn is_valid(&self) -> bool {
-        let rises = |values: &[f64]| values.windows(2).all(|pair| pair[0] < pair[1]);
-        let numbers = self.kappa >= 0.0 && [self.v0, self.lag_s].iter().all(|value| *value > 0.0 && value.is_finite());
-        let pairs = self.thresholds.len() == WIDENED_PLAYS && self.weights.len() == WIDENED_PLAYS;
-        let weights =
-            self.weights.iter().all(|weight| *weight >= 0.0) && self.weights.first().is_some_and(|w| *w > 0.0);
-        numbers && pairs && weights && self.thresholds[0] == 0.0 && rises(&self.thresholds)
+        let Self { kappa, v0, lag_s, thresholds, weights } = self;
+        let rates = (0.0..=1.0).contains(kappa) && (1e-2..=1e6).contains(v0) && (1e-6..=0.1).contains(lag_s);
+        let counts = thresholds.len() == WIDENED_PLAYS && weights.len() == WIDENED_PLAYS;
+        let rise = thresholds.windows(2).all(|pair| pair[0] < pair[1]) && thresholds.last().is_some_and(|r| *r <= 1e6);
+        let sum = weights.iter().fold(0.0, |sum, weight| sum + weight);
+        let carried = weights.iter().all(|weight| *weight >= 0.0) && (1e-9..=1e6).contains(&sum);
+        rates && counts && rise && thresholds[0] == 0.0 && carried && weights[0] >= LEAST_FIRST * sum
     }
 }
+
+/// Least weight of the play without a threshold, of all weights: what is left of the slope after a turn.
+const LEAST_FIRST: f64 = 1e-3;
 
 impl Around {
     /// The read-out is also used beyond both ends of the travel, up to this share of it.
@@ -173,9 +177,10 @@ impl Around {
         let bounded = plus > 0.0 && minus > -plus && self.rest_um.abs() * plus <= self.slope * (1.0 + 1e-6);
         let saturates = bounded || self.slope == 0.0 && self.rest_um == 0.0;
         let creeps = self.creep.iter().all(|[time, weight]| *time > 0.0 && (0.0..1.0).contains(weight));
-        if self.plays.as_ref().is_some_and(|plays| !plays.is_valid()) {
+        if self.plays.as_ref().is_some_and(|plays| !plays.is_valid() || self.slope > 0.0) {
             return Err(format!(
-                "{WIDENED_PLAYS} plays with rising thresholds from 0 and weights >= 0, the first > 0, are expected"
+                "{WIDENED_PLAYS} plays are expected: thresholds that rise from 0, weights >= 0, the first at least a thousandth of all; \
+                 kappa 0 to 1, v0_V_per_s 0.01 to 1e6, lag_s 1e-6 to 0.1, slope_um_per_V 0"
             ));
         }
         if !(positive && saturates && creeps) {
@@ -242,7 +247,9 @@ impl Around {
         let p: Vec<f64> = h.iter().map(|h| gain * self.read_out(*h)).collect();
         let (read_out, _) = through_zero(&moved, &p).ok_or_else(|| NOT_RISING.to_owned())?;
         let (slope, rest_um) = (gain * self.slope, gain * self.rest_um);
-        Self { read_out, travel_um: of(travel), slope, rest_um, ..self.clone() }.validate()
+        let mut plays = self.plays.clone();
+        plays.iter_mut().flat_map(|plays| &mut plays.weights).for_each(|weight| *weight *= gain);
+        Self { read_out, travel_um: of(travel), slope, rest_um, plays, ..self.clone() }.validate()
     }
 
     /// The state A z, µm, after a step of the drive (V) from the state `before` (µm).

@@ -173,7 +173,7 @@ impl Summary {
             digest: compiled.ir.digest.clone(),
             output: output.display().to_string(),
             files,
-            tables: hysteresis.tables.len(),
+            tables: if hysteresis.has_plays() { 0 } else { hysteresis.tables.len() },
             table_bytes: nodes * compiled.ir.scalar.bits() as usize / 8,
             host_library: None,
             measurement: None,
@@ -233,7 +233,9 @@ impl Summary {
         out.push_str(&self.found);
         let (tables, plural, grid) = (self.tables, if self.tables == 1 { "" } else { "s" }, self.grid);
         let bytes = group(self.table_bytes as u64);
-        let _ = writeln!(out, "  tables: {tables} Everett table{plural} of N = {grid}, {bytes} bytes");
+        if tables > 0 {
+            let _ = writeln!(out, "  tables: {tables} Everett table{plural} of N = {grid}, {bytes} bytes");
+        }
         if let Some(library) = &self.host_library {
             let _ = writeln!(out, "  host library: {library} (links only without a panic path)");
         }

@@ -41,7 +41,7 @@
 //!     rest: -0.25,
 //! };
 //! let table = BoucWenEverett { still, around: &around };
-//! let mut leg = BoucWenMemory::<f64, 8, 0>::new(-0.25);
+//! let mut leg = BoucWenMemory::<f64, 8, 0>::at_rest(-0.25);
 //! let mut last = 0.0;
 //! for step in 1..=100 {
 //!     last = leg.apply(&table, f64::from(step) * 0.01);

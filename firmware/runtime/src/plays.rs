@@ -12,6 +12,34 @@
 //! evaluated P, its slope and the distance to the nearest such place at the drive that repeats its own step, with the
 //! thresholds of the next tick, which are known by then. Only a demand beyond that distance needs further steps, at most
 //! [`MOST_STEPS`]. What they leave does not accumulate: the forward model uses the actual drive.
+//!
+//! # Example
+//!
+//! A leg of 1 µm a cell, and as much again once a play of 2 cells moves.
+//!
+//! ```
+//! use specgen_runtime::plays::PLAYS;
+//! use specgen_runtime::{DriveMemory, HysteresisMemory, PlayMemory, Plays};
+//!
+//! let mut plays = Plays {
+//!     full_scale: 32.0_f64,
+//!     thresholds: [2.0; PLAYS],
+//!     weights: [0.0; PLAYS],
+//!     slope: 2e-6,
+//!     rest: 2e-6,
+//!     widening: 0.0,
+//!     per_rate: 1.0,
+//!     decay: 0.0,
+//! };
+//! plays.thresholds[0] = 0.0;
+//! [plays.weights[0], plays.weights[1]] = [1e-6; 2];
+//! let mut leg = PlayMemory::new(plays.thresholds);
+//! // The play moves from 4 cells on: 10 + (10 − 4) µm.
+//! assert!((leg.apply(&&plays, 10.0) - 16e-6).abs() < 1e-18);
+//! // It rests on the way back.
+//! let drive = leg.solve(&&plays, 15e-6);
+//! assert!((drive - 9.0).abs() < 1e-9);
+//! ```
 
 use crate::crc::Crc32;
 use crate::everett::LastLine;
@@ -23,7 +51,7 @@ use crate::snapshot::LARGEST;
 pub const PLAYS: usize = 24;
 
 /// Most Newton steps of a tick after the first.
-pub const MOST_STEPS: u32 = 3;
+pub const MOST_STEPS: u32 = 12;
 
 /// Plays of one leg.
 #[derive(Debug, Clone, Copy)]
@@ -72,7 +100,7 @@ crate::state! { |words|
         /// v, cells per tick.
         rate: T = T::ZERO, number(LARGEST);
         /// s of the next tick.
-        scale: T = T::ONE, number(LARGEST);
+        scale: T = T::ONE, number(64.0) if *scale >= T::ONE;
         /// p_i − u, cells.
         states: [T; PLAYS] = thresholds, numbers(LARGEST);
         /// Last step of the drive, cells.
@@ -80,7 +108,7 @@ crate::state! { |words|
         /// Change of P if the next tick repeats it, m; the slope of P there, m per cell; the distance to where it changes, cells.
         onward: T = T::ZERO, number(LARGEST);
         /// Until a tick has evaluated them, the search begins at the present drive.
-        slope: T = T::ONE, number(LARGEST) if *slope > T::ZERO;
+        slope: T = T::ONE, number(LARGEST) if *slope >= T::from_f64(1e-15);
         clear: T = T::ZERO, number(LARGEST) if *clear >= T::ZERO;
     }
 }
@@ -227,11 +255,12 @@ impl<T: Real> HysteresisMemory<T, &Plays<T>> for PlayMemory<T> {
     }
 }
 
-/// ln of a value from 1 to 2¹⁶, to 1e-6: halved until it is below 2, then a series in t = (m − 1)/(m + 1).
+/// ln of a value from 1 to 2³², to 1e-6: halved until it is below 2, then a series in t = (m − 1)/(m + 1).
 #[inline]
 fn logarithm<T: Real>(value: T) -> T {
     let (mut rest, mut sum) = (value, T::ZERO);
     for (bound, share, part) in [
+        (65536.0, 0.0000152587890625, 11.090354888959125),
         (256.0, 0.00390625, 5.545177444479562),
         (16.0, 0.0625, 2.772588722239781),
         (4.0, 0.25, 1.3862943611198906),

@@ -2,11 +2,12 @@
 
 use crate::ir::{BoucWen, LEGS, Lead, Plays, RateModel, Resonance, Scalar};
 use specgen_identify::everett::EverettTable;
-use specgen_identify::leg_model::{Around, WidenedPlays, strokes};
+use specgen_identify::leg_model::{Around, WIDENED_PLAYS, WidenedPlays, strokes};
 use specgen_identify::mean;
 use specgen_language::model::{Model, RateDependence};
 
 use specgen_runtime::bouc_wen::READ_OUT;
+use specgen_runtime::plays::PLAYS;
 
 /// Tolerance of the inverse, as a share of a converter code.
 const SHARE_OF_CODE: f64 = 0.125;
@@ -136,16 +137,20 @@ fn bouc_wen(model: &Model, tables: &[EverettTable], around: &[Option<Around>], s
     RateModel::BoucWen { legs: Box::new(core::array::from_fn(leg)), plays: plays.map(Box::new) }
 }
 
+const _: () = assert!(WIDENED_PLAYS == PLAYS);
+
 /// Plays that widen, in m and cells of a `grid`.
 fn plays(own: &WidenedPlays, grid: usize, volts_per_cell: f64, period: f64, scalar: Scalar) -> Plays {
     let round = |value: f64| scalar.round(value);
     let thresholds: Vec<f64> = own.thresholds.iter().map(|r| round(r / volts_per_cell)).collect();
     let weights: Vec<f64> = own.weights.iter().map(|w| round(w * 1e-6 * volts_per_cell)).collect();
-    let sum = |of: &dyn Fn(usize) -> f64| (0..weights.len()).fold(0.0, |sum, k| sum + of(k));
+    // As the runtime sums them: P is exactly 0 at rest.
+    let held = weights.iter().zip(&thresholds).skip(1);
+    let rest = held.fold(0.0, |sum, (w, r)| round(sum + round(w * r)));
     Plays {
         full_scale: grid as f64,
-        slope: round(sum(&|k| weights[k])),
-        rest: round(sum(&|k| weights[k] * thresholds[k])),
+        slope: round(weights.iter().fold(0.0, |sum, w| sum + w)),
+        rest,
         widening: round(own.kappa),
         per_rate: round(volts_per_cell / (own.v0 * period)),
         decay: round(libm::exp(-period / own.lag_s)),

@@ -27,7 +27,7 @@ const SCORED: f64 = 0.1;
 const WORTHWHILE: [f64; 2] = [0.1, 0.2];
 /// Largest κ, and the first ones that are tried.
 const MOST_WIDENING: f64 = 0.2;
-const FIRST_WIDENINGS: [f64; 4] = [0.0, 5e-3, 1.25e-2, 5e-2];
+const FIRST_WIDENINGS: [f64; 5] = [0.0, 5e-3, 1.25e-2, 5e-2, MOST_WIDENING];
 /// Plays among which those of the leg are found.
 const FINE_PLAYS: usize = 192;
 /// Fewer folds give no estimate of the spread.
@@ -320,13 +320,11 @@ impl<'a> Data<'a> {
     fn on_grid(&self, chosen: Candidate, options: &crate::Options) -> Option<LegModel> {
         let Candidate { family, model, fitted, .. } = chosen;
         let mut chosen = model?;
-        let finer = options.finest > self.plane.grid;
         if let Some(plays) = chosen.around.as_ref().and_then(|around| around.plays.as_ref()) {
-            let grid = if finer { options.finest } else { options.grid };
-            chosen.table = plays.table(&Plane { grid, range: self.plane.range });
+            chosen.table = plays.table(&Plane { grid: options.grid, range: self.plane.range });
             return Some(chosen);
         }
-        if let Some((saturated, shape)) = fitted.filter(|_| family.has_plays() && finer) {
+        if let Some((saturated, shape)) = fitted.filter(|_| family.has_plays() && options.finest > self.plane.grid) {
             let halves = core::iter::successors(Some(options.finest), |grid| Some(grid / 2));
             let finer = halves.take_while(|grid| *grid >= options.grid).find_map(|grid| {
                 let problem =
@@ -403,7 +401,7 @@ impl<'a> Data<'a> {
     }
 }
 
-/// The fit with the κ of the least residual: `from` and its surroundings within a factor of 1 ± `span`.
+/// The fit with the κ of the least residual: of `from`, then of steps about the best that become shorter.
 fn widest<'p>(
     from: &[f64],
     rounds: i32,
@@ -414,7 +412,8 @@ fn widest<'p>(
         let trials = match &best {
             None => from.to_vec(),
             Some((kappa, _)) => {
-                let span = 0.4 * kappa * libm::ldexp(1.0, -round);
+                let least = FIRST_WIDENINGS[1];
+                let span = 0.4 * if *kappa > 0.0 { *kappa } else { least } * libm::ldexp(1.0, -round);
                 vec![kappa - span, kappa + span]
             }
         };
@@ -447,7 +446,7 @@ fn merged(r: &[f64], weights: &[f64]) -> Vec<f64> {
         plays[k] = [(v * a + w * b) / (v + w), v + w];
     }
     let mut r: Vec<f64> = plays.iter().map(|play| play[0]).collect();
-    // As many as the controller has: further ones at the end carry nothing.
+    // As many as the controller has: the widest gaps are split.
     while r.len() < WIDENED_PLAYS {
         let widest = (1..r.len()).reduce(|a, b| if r[b] - r[b - 1] > r[a] - r[a - 1] { b } else { a });
         let Some(k) = widest else { break };

@@ -8,7 +8,7 @@ use specgen_language::model::LegModelKind as Kind;
 /// Time constants of the creep, s: a decade apart.
 pub(crate) const TIMES: [f64; 5] = [100.0, 10.0, 1.0, 0.1, 0.01];
 /// Plays of a leg with plays in the controller, `specgen_runtime::plays::PLAYS`.
-pub(super) const WIDENED_PLAYS: usize = 24;
+pub const WIDENED_PLAYS: usize = 24;
 
 /// A family of models.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

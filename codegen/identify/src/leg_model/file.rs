@@ -3,6 +3,7 @@
 use super::{Around, LegModel};
 use crate::export::{read_table_csv, write_table_csv};
 use crate::findings::Findings;
+use crate::regressor::Plane;
 use specgen_language::diagnostic::{Diagnostic, codes};
 
 /// Begins the line of a leg file with what is around its table.
@@ -19,7 +20,7 @@ pub fn write_leg_csv(model: &LegModel) -> String {
     }
 }
 
-/// Reads the text of [`write_leg_csv`].
+/// Reads the text of [`write_leg_csv`]; the table of plays is made from them again.
 ///
 /// # Errors
 /// As [`read_table_csv`]; or a finding if the line of the leg model is not as written.
@@ -29,7 +30,11 @@ pub fn read_leg_csv(text: &str, shown_as: &str) -> Result<LegModel, Vec<Diagnost
     let Some((at, line)) = line else { return Ok(LegModel { table, around: None }) };
     let around = serde_json::from_str::<Around>(line).map_err(|error| error.to_string());
     match around.and_then(|around| around.validate()) {
-        Ok(around) => Ok(LegModel { table, around: Some(around) }),
+        Ok(around) => {
+            let plane = Plane { grid: table.grid, range: [table.drive_min, table.drive_max] };
+            let table = around.plays.as_ref().map_or(table, |plays| plays.table(&plane));
+            Ok(LegModel { table, around: Some(around) })
+        }
         Err(why) => {
             let mut findings = Findings::new(shown_as);
             let help = "identify the record again";

@@ -2,12 +2,18 @@
 
 use crate::common::*;
 use specgen_runtime::plays::PLAYS;
-use specgen_runtime::{DriveMemory, HysteresisMemory, PlayMemory, Plays, Real};
+use specgen_runtime::{DriveMemory, HysteresisMemory, LastLine, PlayMemory, Plays, Real};
 
 /// A leg of about 60 µm over 32 cells.
 fn plays<T: Real>(widening: f64) -> Plays<T> {
-    let threshold = |k: usize| 16.0 * k as f64 / PLAYS as f64;
-    let weight = |k: usize| if k == 0 { 1e-6 } else { 1.5e-7 * (-(k as f64) / 12.0).exp() };
+    of(
+        widening,
+        |k| 16.0 * k as f64 / PLAYS as f64,
+        |k| if k == 0 { 1e-6 } else { 1.5e-7 * (-(k as f64) / 12.0).exp() },
+    )
+}
+
+fn of<T: Real>(widening: f64, threshold: impl Fn(usize) -> f64, weight: impl Fn(usize) -> f64) -> Plays<T> {
     let sum = |of: &dyn Fn(usize) -> f64| (0..PLAYS).map(of).sum::<f64>();
     Plays {
         full_scale: T::from_f64(32.0),
@@ -98,6 +104,36 @@ fn the_inverse_ends_where_the_demand_is() {
             let single = missed::<f32>(widening, hertz, noise, jump);
             let case = format!("κ {widening}, {hertz} Hz, noise {noise}, jump {jump}: {double:e}; f32 {single:e}");
             assert!(double < 1e-19 + 1e-12 * 40e-6 && single < 2e-11, "{case}");
+        }
+    }
+}
+
+/// Legs that are flat after a turn, with plays anywhere and some of them without weight, and demands anywhere.
+#[test]
+fn jumps_over_the_range_are_inverted_on_flat_legs() {
+    let mut random = Random(11);
+    for leg in 0..40 {
+        let mut thresholds: Vec<f64> = (0..PLAYS).map(|_| 16.0 * random.unit()).collect();
+        thresholds[0] = 0.0;
+        thresholds.sort_by(f64::total_cmp);
+        let weights: Vec<f64> = (0..PLAYS).map(|k| if k % 5 == 3 { 0.0 } else { 1e-7 * random.unit() }).collect();
+        let sum = weights[1..].iter().sum::<f64>();
+        let weight = |k: usize| if k == 0 { 1e-3 * sum } else { weights[k] };
+        let plays: Plays<f64> = of(0.05, |k| thresholds[k], weight);
+        let mut memory = fresh(&plays);
+        for tick in 0..500 {
+            let demand = plays.slope * 32.0 * 0.5 * random.unit();
+            let (solved, reaches) = (memory.solve(&&plays, demand), memory.reaches(&&plays, demand));
+            let before = memory;
+            let beyond = memory.follow_within(&&plays, demand, |drive| drive);
+            assert_eq!((memory.drive().to_bits(), beyond), (solved.to_bits(), !reaches), "leg {leg}, tick {tick}");
+            let mut tracked = before;
+            let did = tracked.track(&&plays, &mut LastLine::new(), demand, Some);
+            assert_eq!(did, reaches, "leg {leg}, tick {tick}");
+            if reaches {
+                assert_eq!(tracked.drive().to_bits(), solved.to_bits());
+                assert!((memory.displacement() - demand).abs() < 1e-15, "leg {leg}, tick {tick}");
+            }
         }
     }
 }

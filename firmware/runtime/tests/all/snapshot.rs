@@ -6,8 +6,8 @@ use specgen_runtime::setpoint::{Generator, LONGEST, Profile, Stop};
 use specgen_runtime::snapshot::{Field, InvalidState, LARGEST, Reader, Sizes, Snapshot, StatePart, Writer};
 use specgen_runtime::supervisor::{Approach, Supervisor, TIMERS};
 use specgen_runtime::{
-    BoucWenMemory, CreepMemory, Damping, Digest, DynamicMemory, Estimate, Integral, Motion, NotchState, Rate,
-    ReversalMemory, Transfer,
+    BoucWenMemory, CreepMemory, Damping, Digest, DynamicMemory, Estimate, Integral, Motion, NotchState, PlayMemory,
+    Rate, ReversalMemory, Transfer,
 };
 
 /// No two bounds are alike.
@@ -291,6 +291,19 @@ fn staircase(len: u64, drive: f64, extrema: &[f64]) -> Words {
         words = words.whole(&stairs);
     }
     words
+}
+
+#[test]
+fn every_word_of_plays_counts() {
+    let fresh = PlayMemory::<f64>::new(std::array::from_fn(|k| k as f64));
+    let of = |state: &PlayMemory<f64>| digest(|digest| state.digest(digest));
+    let words = save(&fresh);
+    for place in 0..words.len() {
+        let mut other = words.clone();
+        other[place] ^= 1;
+        let changed = restore(&fresh, &other).unwrap();
+        assert!(save(&changed) == other && of(&changed) != of(&fresh), "word {place}");
+    }
 }
 
 /// The words of a state of rate-dependent legs begin with those of the staircase. Room that is not used is zero.
