@@ -21,7 +21,7 @@ use specgen_language::interrupt;
 
 pub(crate) use head::{Head, Shape, decoded};
 pub(crate) use lines::LineNumbers;
-pub(crate) use scan::{Part, tables};
+pub(crate) use scan::{MOST_TABLES, Part, tables};
 
 /// Codes and texts for the mistakes in a kind of file.
 #[derive(Debug)]

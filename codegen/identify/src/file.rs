@@ -8,7 +8,7 @@ use std::path::Path;
 
 use flate2::read::MultiGzDecoder;
 
-use super::columns::{self, Content, MAX_SAMPLES, Part, foreign, names};
+use super::columns::{self, Content, MAX_SAMPLES, MOST_TABLES, Part, foreign, names};
 use super::container::{Columns, FARTHEST, Kind, Refusal, Table, unpack};
 use super::findings::Findings;
 use super::reading::{MaxSize, Reading, shown_size};
@@ -70,13 +70,36 @@ enum Unpacked {
 /// The table of a text that is read, and its number of rows.
 fn part(text: impl Read, series: Option<&str>, findings: &mut Findings) -> Option<(Part, Choice, usize)> {
     let (parts, extents): (Vec<Part>, Vec<Extent>) = columns::tables(text).into_iter().unzip();
-    // What has no table is refused when it is read.
-    if parts.len() < 2 && series.is_none() {
-        let rows = extents.first().map_or(0, |extent| extent.rows);
-        return Some((parts.first().copied().unwrap_or(Part::WHOLE), Choice::default(), rows));
+    if parts.len() > MOST_TABLES {
+        let message = format!("has more than {MOST_TABLES} tables: lines of text divide its rows");
+        return findings.refuse(codes::RECORD_TOO_LARGE, None, message, "delete the text between the rows");
     }
-    tables::choose(&extents, is_record, &[], series, findings)
-        .map(|chosen| (parts[chosen.table], chosen, extents[chosen.table].rows))
+    // What has no table is refused when it is read.
+    let choice = match parts[..] {
+        [] if series.is_none() => return Some((Part::WHOLE, Choice::default(), 0)),
+        [_] if series.is_none() => Choice::default(),
+        _ => tables::choose(&extents, is_record, &[], series, findings)?,
+    };
+    let part = parts[choice.table];
+    report_behind(part, findings)?;
+    Some((part, choice, extents[choice.table].rows))
+}
+
+/// Most lines behind a table that may be left out: means and the like.
+const FEW: usize = 10;
+
+/// Notes the lines behind a table that look like rows; `None` if there are too many.
+fn report_behind(Part { behind: (count, first), .. }: Part, findings: &mut Findings) -> Option<()> {
+    let message = format!("behind a line of text, rows are not read: {count} from line {first} on");
+    match count {
+        0 => {}
+        1..=FEW => findings.add(codes::RECORD_PART, Some(first), message, "check that the record needs none of them"),
+        _ => {
+            let help = "delete the text between the rows, and behind them what is no row";
+            return findings.refuse(codes::RECORD_VALUE, Some(first), message, help);
+        }
+    }
+    Some(())
 }
 
 /// Columns and comments of the table of a binary file that is read.

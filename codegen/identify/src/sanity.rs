@@ -45,7 +45,7 @@ pub(crate) fn check(lines: &LineNumbers, columns: &[Vec<f64>; 3], findings: &mut
 fn check_duration(time: &[f64], findings: &mut Findings) {
     let [first, .., last] = time else { return };
     let duration = last - first;
-    if duration <= LONGEST {
+    if duration <= LONGEST || !duration.is_finite() {
         return;
     }
     let message = format!("goes on for {:.1} hours, by its column `time_s`", duration / 3600.0);
@@ -53,6 +53,12 @@ fn check_duration(time: &[f64], findings: &mut Findings) {
 }
 
 pub(crate) fn check_time(lines: &LineNumbers, time: &[f64], findings: &mut Findings) {
+    if let Some(k) = time.iter().position(|t| !(t - time[0]).is_finite()) {
+        let message = format!("time goes from {} s to {} s, more than a number holds", time[0], time[k]);
+        let help = "give `--rate HZ` with the sampling rate in Hz";
+        findings.add(codes::RECORD_TIME, Some(lines.at(k)), message, help);
+        return;
+    }
     let mut intervals: Vec<f64> = time.windows(2).map(|w| w[1] - w[0]).collect();
     let mut increasing = true;
     for (k, dt) in intervals.iter().enumerate().filter(|(_, dt)| **dt <= 0.0) {

@@ -85,7 +85,7 @@ fn at_line(lines: &[Line], at: usize, interval: Option<f64>) -> Head {
     let rows = lines[at + 1..].iter().find_map(|(_, line)| Some((separator_of(line)?, line)));
     let separator = rows.map_or_else(|| of_names(text), |(separator, _)| separator);
     let count = rows.map(|(separator, row)| split(row, separator).len());
-    let mut names = fitting_names(text, count);
+    let mut names = fitting_names(text, count.filter(|_| matches!(separator, BLANK | b'\t')));
     if Some(names.len()) == count.map(|count| 2 * count)
         && names[1..].iter().step_by(2).all(|unit| names::is_unit(unit))
     {
@@ -93,20 +93,21 @@ fn at_line(lines: &[Line], at: usize, interval: Option<f64>) -> Head {
         names = names.chunks(2).map(|pair| pair.join(",")).collect();
     }
     let mut head = Head { names, next: at + 1, interval, ..Head::without_names(*line, separator) };
-    while let Some((_, below)) = lines.get(head.next).filter(|(_, below)| is_below_names(below)) {
+    head.skip_rule(lines);
+    let has_units =
+        |(_, line): &&Line| is_units(line) || head.names.iter().any(|name| is_increment(name)) && is_start(line);
+    if let Some((_, below)) = lines.get(head.next).filter(has_units) {
         head.add_units(below);
         head.next += 1;
-    }
-    if head.next == at + 1
-        && let Some((_, above)) = at.checked_sub(1).map(|at| &lines[at]).filter(|(_, above)| is_units(above))
-    {
+        head.skip_rule(lines);
+    } else if let Some((_, above)) = at.checked_sub(1).map(|at| &lines[at]).filter(|(_, above)| is_units(above)) {
         head.add_units(above);
     }
     head
 }
 
-/// The names in a line; `count`: of the columns below, if there are any. Blanks that separate columns may also be within
-/// the names or before their units.
+/// The names in a line; `count`: of the columns below, if blanks or tabs separate them. These may also be within the names
+/// or before their units.
 fn fitting_names(line: &[u8], count: Option<usize>) -> Vec<String> {
     let names = names_of(line);
     let words = split(uncommented(line), BLANK);
@@ -128,19 +129,23 @@ fn fitting_names(line: &[u8], count: Option<usize>) -> Vec<String> {
     [of_words, of_gaps].into_iter().find(|other: &Vec<String>| Some(other.len()) == count).unwrap_or(names)
 }
 
-/// Whether a line between names and rows is no row: units, or a rule.
-fn is_below_names(line: &[u8]) -> bool {
+/// Whether a line below `Start,Increment` has units, start and increment, as `Sequence,Volt,0,1e-3`.
+fn is_start(line: &[u8]) -> bool {
     let fields = names_of(line);
     let is_unit_or_number = |field: &String| field.is_empty() || names::is_unit(field) || field.parse::<f64>().is_ok();
     let [first, rest @ ..] = &fields[..] else { return false };
-    // As in `Sequence,Volt,0,1e-3`.
-    let begins_with_word = first.starts_with(char::is_alphabetic) && first.parse::<f64>().is_err();
-    let are_units = begins_with_word && rest.iter().any(|field| names::is_unit(field));
-    is_units(line) || is_rule(line) || are_units && rest.iter().all(is_unit_or_number)
+    first.starts_with(char::is_alphabetic)
+        && first.parse::<f64>().is_err()
+        && rest.iter().any(|field| names::is_unit(field))
+        && rest.iter().all(is_unit_or_number)
+}
+
+fn is_increment(name: &str) -> bool {
+    name.eq_ignore_ascii_case("increment")
 }
 
 /// Whether a line is drawn, as `-----` or `|---|---|`.
-fn is_rule(line: &[u8]) -> bool {
+pub(super) fn is_rule(line: &[u8]) -> bool {
     let line = line.trim_ascii();
     line.len() > 2 && line.iter().all(|byte| matches!(byte, b'-' | b'=' | b'_' | b'|' | b'+' | b':' | b' ' | b'\t'))
 }
@@ -159,7 +164,7 @@ fn of_names(line: &[u8]) -> u8 {
     SEPARATORS.into_iter().rev().max_by_key(|separator| known(*separator)).unwrap_or(b',')
 }
 
-/// A line without its mark of a comment.
+/// The line without its comment sign.
 fn uncommented(line: &[u8]) -> &[u8] {
     line.strip_prefix(b"#").or_else(|| line.strip_prefix(b"%")).unwrap_or(line)
 }
@@ -177,7 +182,8 @@ fn is_units(line: &[u8]) -> bool {
 /// Names of a sampling interval in preambles, in lower case letters.
 const INTERVALS: [&str; 6] = ["deltax", "sampleinterval", "samplinginterval", "sampletime", "xincrement", "timestep"];
 
-/// The sampling interval in a line such as `Delta_X\t0,001`, `Sample Interval,1e-3,s` or `# SAMPLE_TIME = 0.001`, s.
+/// The sampling interval in a line such as `Delta_X\t0,001`, `Sample Interval,1e-3,s` or `# SAMPLE_TIME = 0.001`, s; none
+/// if its unit is not known.
 fn interval(line: &[u8]) -> Option<f64> {
     let text = decoded(uncommented(line));
     let (name, rest) = text.split_once(['\t', ',', ';', '=', ':'])?;
@@ -185,14 +191,23 @@ fn interval(line: &[u8]) -> Option<f64> {
         return None;
     }
     let rest = rest.trim_matches(|c: char| c.is_whitespace() || matches!(c, ',' | ';'));
-    let mut words = rest.split([' ', '\t', ';']);
+    let mut words = rest.split([' ', '\t', ';']).filter(|word| !word.is_empty());
     let number = words.next()?;
     let (number, unit) = match number.split_once(',') {
-        Some((whole, unit)) if unit.contains(char::is_alphabetic) => (whole.to_owned(), Some(unit)),
+        Some((whole, unit)) if unit.starts_with(char::is_alphabetic) => (whole.to_owned(), Some(unit)),
         _ => (number.replace(',', "."), words.next()),
     };
-    let per = unit.and_then(|unit| names::quantity("time_s")?.per(unit)).unwrap_or(1.0);
-    number.parse().ok().map(|step: f64| step / per).filter(|step| step.is_finite() && *step > 0.0)
+    let unit = unit.map(|unit| unit.trim_matches(['[', ']', '(', ')']));
+    let per = match unit.filter(|unit| unit.starts_with(char::is_alphabetic)) {
+        // `nsec` is `ns`.
+        Some(unit) => names::quantity("time_s")?.per(unit.strip_suffix("ec").unwrap_or(unit))?,
+        None => 1.0,
+    };
+    number.parse().ok().map(|step: f64| step / per).filter(is_interval)
+}
+
+fn is_interval(step: &f64) -> bool {
+    step.is_finite() && *step > 0.0
 }
 
 /// Rows that are checked for decimal commas.
@@ -216,11 +231,15 @@ impl Head {
         self.filled.iter().find(|(_, shape)| *shape == Shape::Clock).map(|(at, _)| *at)
     }
 
+    fn skip_rule(&mut self, lines: &[Line]) {
+        self.next += usize::from(lines.get(self.next).is_some_and(|(_, line)| is_rule(line)));
+    }
+
     /// Appends the units in a line to the names without one; `Increment` has the interval of a counted time.
     fn add_units(&mut self, line: &[u8]) {
         for (name, unit) in self.names.iter_mut().zip(names_of(line)) {
-            if name.eq_ignore_ascii_case("increment") {
-                self.interval = self.interval.or_else(|| unit.parse().ok().filter(|step: &f64| *step > 0.0));
+            if is_increment(name) {
+                self.interval = self.interval.or_else(|| unit.parse().ok().filter(is_interval));
             }
             if names::is_unit(&unit) && !names::has_unit(name) {
                 *name = format!("{name} [{}]", unit.trim_matches(['[', ']', '(', ')']));
@@ -384,6 +403,7 @@ mod tests {
             ("0;1\n2;3\n", 1, &[], b';'),
             ("drve_V,t_s\nx,1\n0,1\n", 1, &["drve_V", "t_s"], b','),
             ("time_s;drive_V\n", 1, &["time_s", "drive_V"], b';'),
+            ("Time s,Drive V,Position um\n0,1,2,\n", 1, &["Time s", "Drive V", "Position um"], b','),
         ] {
             let found = head(text);
             assert_eq!(
@@ -392,7 +412,29 @@ mod tests {
                 "{text}"
             );
         }
-        assert_eq!(head("Delta_X\t0,001\t0,001\nX_Value\tA\n\t2\n").interval, Some(1e-3));
+        for (line, interval) in [
+            ("Delta_X\t0,001\t0,001", Some(1e-3)),
+            ("Delta_X\t1,000000E-3\t1,000000E-3", Some(1e-3)),
+            ("Sample Interval;2,000E-06", Some(2e-6)),
+            ("Sample Interval: 1  [ms]", Some(1e-3)),
+            ("Sample Interval: 1000000 nsec", Some(1e-3)),
+            ("Sample Interval: 1000 fortnights", None),
+            ("Sample Interval,1e-3,ticks", None),
+        ] {
+            assert_eq!(head(&format!("{line}\nX_Value\tA\n\t2\n")).interval, interval, "{line}");
+        }
+        assert_eq!(head("X,A,Start,Increment\nSequence,Volt,0,inf\n0,1\n").interval, None);
+    }
+
+    #[test]
+    fn rows_that_look_like_units_are_rows() {
+        for (text, next) in [
+            ("dir,mark,time_s,drive_V\nup,d,0,0\nup,d,1,0\n", 1),
+            ("X,A,Start,Increment\nSequence,Volt,0,1\nup,s,0,1\n0,1\n", 2),
+            ("time,drive\n----\ns,V\n----\ns,V\n0,1\n", 4),
+        ] {
+            assert_eq!(head(text).next, next, "{text}");
+        }
     }
 
     #[test]

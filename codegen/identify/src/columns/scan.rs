@@ -2,7 +2,7 @@
 
 use std::io::Read;
 
-use super::head::{self, Line, decoded, has_fields, is_row, names_of, separator_of, split};
+use super::head::{self, Line, decoded, has_fields, is_row, is_rule, names_of, separator_of, split};
 use super::lines::LineReader;
 use super::number::number;
 use crate::tables::Extent;
@@ -19,12 +19,17 @@ pub(crate) struct Part {
     pub(crate) rows: usize,
     /// Parts between blank lines in which the first column always changes in the same direction; 0 if any does not.
     pub(crate) curves: usize,
+    /// Number of the lines behind the last table that look like rows, and the first of them.
+    pub(crate) behind: (usize, usize),
 }
 
 impl Part {
     /// A text that is not divided.
-    pub(crate) const WHOLE: Self = Self { from: 1, last: None, rows: 0, curves: 0 };
+    pub(crate) const WHOLE: Self = Self { from: 1, last: None, rows: 0, curves: 0, behind: (0, 0) };
 }
+
+/// Most tables of a text.
+pub(crate) const MOST_TABLES: usize = 10_000;
 
 /// Rows of a part between blank lines that are a curve.
 const CURVE: usize = 3;
@@ -48,7 +53,7 @@ struct Curve {
     steps: [bool; 3],
 }
 
-/// The tables of a text, in their order; none if it is not one.
+/// The tables of a text, in their order, at most one more than [`MOST_TABLES`]; none if it is not one.
 pub(crate) fn tables(source: impl Read) -> Vec<(Part, Extent)> {
     let mut input = LineReader::new(source);
     let mut tables: Vec<Open> = Vec::new();
@@ -66,6 +71,7 @@ pub(crate) fn tables(source: impl Read) -> Vec<(Part, Extent)> {
             Some(table) if !has_fields(&line) => table.end_curve(),
             Some(table) if table.has_row(&line) => table.add(at, &line),
             Some(table) if is_text(&line, table.separator, table.curve.rows == 0) => {
+                table.count_behind(at, &line);
                 between.push((at, std::mem::take(&mut line)));
             }
             // A row with a mistake.
@@ -76,15 +82,22 @@ pub(crate) fn tables(source: impl Read) -> Vec<(Part, Extent)> {
                     let from = tables.last().map_or(1, |table| table.last + 1);
                     tables.push(Open::new(from, separator, &between));
                     between.clear();
+                    if tables.len() > MOST_TABLES {
+                        break;
+                    }
                 }
-                None if between.len() < head::LINES && has_fields(&line) => {
-                    between.push((at, std::mem::take(&mut line)));
+                None if has_fields(&line) => {
+                    tables.last_mut().into_iter().for_each(|table| table.count_behind(at, &line));
+                    if between.len() < head::LINES {
+                        between.push((at, std::mem::take(&mut line)));
+                    }
                 }
                 None => {}
             },
         }
     }
     let count = tables.len();
+    tables.iter_mut().rev().skip(1).for_each(|table| table.part.behind = (0, 0));
     let ends = between.is_empty();
     tables.into_iter().enumerate().map(|(k, table)| table.finish(ends && k + 1 == count)).collect()
 }
@@ -95,7 +108,7 @@ fn is_text(line: &[u8], separator: u8, is_behind_blank: bool) -> bool {
     let is_number = |field: &&[u8]| number(&decoded(field), separator).is_some();
     let fields = split(line, separator);
     let count = if is_behind_blank { 1 } else { fields.len() };
-    !fields[..count].iter().any(is_number)
+    !fields.iter().take(count).any(is_number)
 }
 
 impl Open {
@@ -123,7 +136,19 @@ impl Open {
         let is_part = |byte: &u8| {
             matches!(byte, b'0'..=b'9' | b'+' | b'-' | b'.' | b',' | b'e' | b'E' | b' ' | b'\t' | b';' | b'\r')
         };
-        line.iter().all(is_part) || is_row(line, self.separator)
+        let is_drawn = || is_rule(line) && !line.trim_ascii().iter().any(u8::is_ascii_whitespace);
+        line.iter().all(is_part) && !is_drawn() || is_row(line, self.separator)
+    }
+
+    /// Counts a line behind the table if it begins with a number or has two.
+    fn count_behind(&mut self, at: usize, line: &[u8]) {
+        let numbers = split(line, self.separator).into_iter().map(|field| number(&decoded(field), self.separator));
+        let numbers: Vec<bool> = numbers.map(|number| number.is_some()).collect();
+        if numbers.first() == Some(&true) || numbers.iter().filter(|is| **is).count() > 1 {
+            let (count, first) = &mut self.part.behind;
+            *first = if *count == 0 { at } else { *first };
+            *count += 1;
+        }
     }
 
     fn add(&mut self, at: usize, line: &[u8]) {
@@ -192,7 +217,20 @@ mod tests {
             let text = format!("t,U\n0,1\n1,x\n2,3\n{end}");
             assert_eq!(found(&text), [(1, Some(4), 2, String::new(), names("t,U"))], "{end}");
         }
+        for rule in ["+---+---+", "-----"] {
+            let text = format!("t,U\n0,1\n2,3\n{rule}\n");
+            assert_eq!(found(&text), [(1, Some(3), 2, String::new(), names("t,U"))], "{rule}");
+        }
+        assert_eq!(found("0 1\n\n\"\"\n").len(), 1);
         assert!(found("t,U\n0,\0\n").is_empty() && found("").is_empty());
+    }
+
+    #[test]
+    fn lines_behind_the_table_that_look_like_rows_are_counted() {
+        let behind = |text: &str| tables(text.as_bytes()).into_iter().map(|(part, _)| part.behind).collect::<Vec<_>>();
+        assert_eq!(behind("t,U\n0,1\noverload\n1,2,OVL\nnote,5\n\nup,3,4\n3,OVL\n"), [(3, 4)]);
+        assert_eq!(behind("t,U\n0,1\nMean,1\nend\n"), [(0, 0)]);
+        assert_eq!(behind("t,U\n0,1\noverload\n1,2,OVL\n2,3\n"), [(0, 0), (0, 0)]);
     }
 
     #[test]

@@ -51,7 +51,7 @@ const LABVIEW: &str = "LabVIEW Measurement\t\nSeparator\tTab\nDecimal_Separator\
 fn every_kind_of_text_gives_the_same_record() {
     let names = "X_Value\tVoltage\tVoltage (Filtered)\tComment";
     let by_name: &[&str] = &["drive_V=Voltage", "displacement_um=Voltage (Filtered)"];
-    let lines: [(&str, String, &[&str], Option<f64>); 22] = [
+    let lines: [(&str, String, &[&str], Option<f64>); 26] = [
         ("plain", file("time_s,drive_V,displacement_um", |[t, u, y]| format!("{t},{u},{y}")), &[], None),
         (
             "semicolons, decimal commas, other units and order",
@@ -175,11 +175,31 @@ fn every_kind_of_text_gives_the_same_record() {
             &[],
             None,
         ),
+        ("a column PAR1", file("PAR1,time_s,drive_V,displacement_um", |[t, u, y]| format!("1,{t},{u},{y}")), &[], None),
+        (
+            "a separator behind each row",
+            file("Time s,Drive V,Position um", |[t, u, y]| format!("{t},{u},{y},")),
+            &["drive_V=2"],
+            None,
+        ),
+        (
+            "columns of words",
+            file("dir,mark,time_s,drive_V,displacement_um", |[t, u, y]| format!("up,d,{t},{u},{y}")),
+            &[],
+            None,
+        ),
+        (
+            "a rule below the rows",
+            file("time_s,drive_V,displacement_um", |[t, u, y]| format!("{t},{u},{y}")) + "+---+---+---+\n",
+            &[],
+            None,
+        ),
         ("a note", file("time_s,note,drive_V,displacement_um", |[t, u, y]| format!("{t},a,{u},{y},b")), &[], None),
     ];
     for (name, text, columns, rate) in lines {
         let record = assert_same(name, read(text.as_bytes(), columns, rate));
-        assert!(!record.monitored && record.warnings.is_empty(), "{name}: {:?}", record.warnings);
+        let notes = usize::from(name == "a last line");
+        assert!(!record.monitored && record.warnings.len() == notes, "{name}: {:?}", record.warnings);
         for end in ["\r\n", "\r"] {
             assert_same(name, read(text.replace('\n', end).as_bytes(), columns, rate));
         }
@@ -265,6 +285,7 @@ fn what_is_refused_says_what_is_then_taken() {
         (b"BZh91AY", "packed by bzip2", "unpack it"),
         (b"\xfd7zXZ\0", "packed by xz", "unpack it"),
         (b"{\"time_s\": [0, 1]}", "JSON", "as CSV"),
+        (b"PAR1\x15\x04\x15\x10", "a Parquet file", "as CSV"),
         (b"%PDF-1.4\n%", "a PDF document", "as CSV"),
         (b"\x1f\x8b\x08", "cannot be unpacked", "copy the file again"),
         (b"\xff\xfet\0\n", "odd number of bytes", "copy the file again"),

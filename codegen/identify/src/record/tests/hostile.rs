@@ -188,6 +188,8 @@ fn a_million_columns_are_refused() {
     let tdms = [b"TDSm", &6_u32.to_le_bytes()[..], &4713_u32.to_le_bytes(), &lengths, &objects].concat();
     let found = refusal(&tdms, 1 << 31);
     assert!(found.message.contains("more than 10000 channels"), "{found:?}");
+    let found = refusal("a\n1,2\n".repeat(200_000).as_bytes(), 1 << 31);
+    assert!(found.message.contains("more than 10000 tables"), "{found:?}");
     let mut wide = hdf5_pure::FileBuilder::new();
     for k in 0..11_000 {
         wide.create_dataset(&format!("c{k}")).with_f64_data(&[1.0, 2.0]);

@@ -183,6 +183,29 @@ fn the_data_table_of_a_text_is_found() {
     assert_eq!((fourth.time.len(), fourth.time[0], fourth.warnings.len()), (141, 0.099, 0));
 }
 
+/// A note names a few lines; more would be half a record.
+#[test]
+fn rows_behind_a_text_are_named() {
+    let data = file("time_s,drive_V,displacement_um", |[t, u, y]| format!("{t},{u},{y}"));
+    let more = |count: usize| (0..count).map(|k| format!("{},0,0,OVL\n", k + 1)).collect::<String>();
+    let few = assert_same("few", read(format!("{data}overload\n{}", more(3)).as_bytes(), &[], None));
+    assert!(note(&few).contains("3 from line 243 on"), "{}", note(&few));
+    let found = read(format!("{data}overload\n{}", more(80)).as_bytes(), &[], None).unwrap_err();
+    assert!(found[0].code == "E0506" && found[0].message.contains("80 from line 243 on"), "{found:?}");
+}
+
+#[test]
+fn times_that_no_number_holds_are_refused() {
+    let long =
+        file("X,CH1,CH2,Start,Increment\nSequence,Volt,Volt,0,1e307", |[t, u, y]| format!("{},{u},{y}", 1e3 * t));
+    let untimed = file("drive_V,displacement_um", |[_, u, y]| format!("{u},{y}"));
+    let columns: &[&str] = &["drive_V=CH1", "displacement=CH2*1 um/V"];
+    for (text, columns, rate) in [(long, columns, None), (untimed, &[], Some(1e-320))] {
+        let found = read(text.as_bytes(), columns, rate).unwrap_err();
+        assert!(found.len() == 1 && found[0].help.contains("--rate HZ"), "{found:?}");
+    }
+}
+
 #[test]
 fn stretches_between_gaps_and_joined_runs_are_records() {
     let gap =
