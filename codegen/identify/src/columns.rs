@@ -13,9 +13,10 @@ mod scan;
 use std::io::Read;
 
 use super::findings::Findings;
-use head::{has_fields, is_mark, split};
+use head::{Line, has_fields, is_mark, split};
 use lines::LineReader;
 use names::Conversion;
+use number::{SinceFirst, clock};
 use specgen_language::diagnostic::{Code, codes};
 use specgen_language::interrupt;
 
@@ -53,6 +54,9 @@ pub(crate) const RECORD: Format = Format {
 /// Most samples; a few columns of this length take a gigabyte.
 pub(crate) const MAX_SAMPLES: usize = 1 << 25;
 
+/// The column of times, which may be times of day.
+pub(crate) const TIME: &str = "time_s";
+
 /// A column that is read.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Column<'a> {
@@ -71,6 +75,8 @@ pub(crate) struct Lines<'a> {
     separator: u8,
     /// Decimal sign of the file, once a number has one.
     decimal: Option<char>,
+    /// Times of day so far.
+    clock: Option<SinceFirst>,
     /// Whether an earlier line marked the file as simulated.
     simulated: bool,
     /// The last line of the table, if others follow.
@@ -149,17 +155,44 @@ pub(crate) fn open_part<'a>(
     if let Some((line, message, help)) = head.ambiguous_commas(&ahead).filter(|_| format.preamble) {
         return findings.refuse(format.value, Some(line), message, &help);
     }
+    if let Some(line) = cut_clock(&head, &ahead).filter(|_| format.preamble) {
+        let message = "has a comma before the decimals of the times, and commas between the columns, too".to_owned();
+        let help = "export with a point in the times, as in `10:00:01.123`, or with semicolons between the columns";
+        return findings.refuse(format.value, Some(line), message, help);
+    }
     input.put_back(ahead);
     let lines = Lines {
         format,
         names: head.names.len(),
         separator: head.separator,
         decimal: None,
+        clock: None,
         simulated,
         last: part.last,
         input,
     };
     Some((head, lines))
+}
+
+/// The first line of samples if each has a field more than names, because a comma divides its time of day, as in
+/// `10:00:01,123`.
+fn cut_clock(head: &Head, lines: &[Line]) -> Option<usize> {
+    let is_cut = |(_, line): &&Line| {
+        let fields = split(line, head.separator);
+        let is_clock = |field| clock(&decoded(field)).is_some() && !field.contains(&b'.');
+        let is_thousandths = |field: &[u8]| field.len() == 3 && field.iter().all(u8::is_ascii_digit);
+        fields.len() == head.names.len() + 1
+            && fields.windows(2).any(|pair| is_clock(pair[0]) && is_thousandths(pair[1]))
+    };
+    let mut rows = lines.iter().filter(|(_, line)| has_fields(line));
+    let first = rows.next().filter(|_| head.separator == b',').filter(is_cut)?;
+    rows.all(|row| is_cut(&row)).then_some(first.0)
+}
+
+/// Whether a line of `text` has a value in column `at`.
+pub(crate) fn has_values(text: &str, head: &Head, at: usize) -> bool {
+    let lines = text.split(['\n', '\r']).map(str::as_bytes).filter(|line| has_fields(line));
+    lines.map(|line| split(line, head.separator)).any(|fields| fields.get(at).is_some_and(|field| !field.is_empty()))
 }
 
 /// Where the columns of a record come from.
@@ -267,8 +300,7 @@ impl Lines<'_> {
                 }
             }
             for (column, wanted) in columns.iter_mut().zip(wanted) {
-                let value = self.number(fields.get(wanted.at).copied(), line, wanted.name, findings);
-                column.push(wanted.conversion.apply(value));
+                column.push(self.number(fields.get(wanted.at).copied(), line, wanted, findings));
             }
             if fields.len() > self.names && !self.format.longer_lines {
                 let message = format!("has {} values, expected {}", fields.len(), self.names);
@@ -284,9 +316,9 @@ impl Lines<'_> {
         Some(value).filter(|value| value.is_finite())
     }
 
-    /// The number in a field, or NaN after the problem was reported.
-    fn number(&mut self, field: Option<&[u8]>, line: usize, name: &str, findings: &mut Findings) -> f64 {
-        let format = self.format;
+    /// The number in a field in the unit of the quantity, or NaN after the problem was reported.
+    fn number(&mut self, field: Option<&[u8]>, line: usize, column: &Column, findings: &mut Findings) -> f64 {
+        let (format, name) = (self.format, column.name);
         let Some(field) = field else {
             let message = format!("`{name}` is missing: the line is too short");
             findings.add(format.value, Some(line), message, "complete or delete the line");
@@ -298,11 +330,15 @@ impl Lines<'_> {
             return f64::NAN;
         }
         let text = decoded(field);
-        match number::number(&text, self.separator) {
+        let time = clock(&text);
+        if let Some(time) = time.filter(|_| name == TIME) {
+            return self.clock.get_or_insert(SinceFirst::new(time)).seconds(time);
+        }
+        match number::number(&text, self.separator).filter(|_| time.is_none()) {
             Some((value, _)) if !value.is_finite() => return format.report_not_finite(line, name, &text, findings),
             Some((value, sign)) => {
                 if sign.is_none() || *self.decimal.get_or_insert(sign.unwrap_or('.')) == sign.unwrap_or('.') {
-                    return value;
+                    return column.conversion.apply(value);
                 }
                 let message = format!("`{name}` is `{text}`: the numbers above have another decimal sign");
                 findings.add(format.value, Some(line), message, "write all numbers with the same decimal sign");

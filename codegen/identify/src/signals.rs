@@ -4,6 +4,7 @@ mod places;
 
 use std::path::Path;
 
+pub(crate) use super::columns::TIME;
 use super::columns::{Column, Head, LineNumbers, Samples, names};
 use super::file::{Source, open_file};
 use super::findings::Findings;
@@ -46,9 +47,6 @@ pub(crate) struct Signals {
 }
 
 pub(crate) use places::MONITOR;
-
-/// The column of times.
-pub(crate) const TIME: &str = "time_s";
 
 /// Least number of samples of a record.
 const MIN_SAMPLES: usize = 8;
@@ -103,7 +101,9 @@ pub(crate) fn columns_of(
         let help = "record time, drive and displacement without a break, on the ways back as well";
         return findings.refuse(codes::RECORD_GAP, None, message, help);
     }
-    if header.filled.len() > COLUMNS && rows > 0 && rows < header.filled.len() {
+    let has_names = header.names.iter().any(|name| names::is_known(name))
+        || !header.names.is_empty() && reading.chosen().next().is_some();
+    if header.filled.len() > COLUMNS && rows > 0 && rows < header.filled.len() && !has_names {
         let message = format!("has {rows} lines of {} numbers: rows and columns are exchanged", header.filled.len());
         return findings.refuse(
             codes::RECORD_HEADER,
@@ -115,7 +115,6 @@ pub(crate) fn columns_of(
     let places = places::find(&header, wanted, reading, findings)?;
     let there: Vec<Column> = places.columns.iter().flatten().copied().collect();
     let Samples { lines, columns: values, simulated } = read(&there, findings);
-    let is_clock = places.columns[0].is_some_and(|column| header.clock() == Some(column.at));
     let mut values = values.into_iter();
     let mut columns: Vec<Option<Vec<f64>>> =
         places.columns.iter().map(|place| place.and_then(|_| values.next())).collect();
@@ -127,9 +126,6 @@ pub(crate) fn columns_of(
             None => *time = Some((0..lines.len()).map(|k| k as f64 * interval).collect()),
         }
     }
-    if let (TIME, true, Some(time)) = (wanted[0].name, is_clock, &mut columns[0]) {
-        since_first(time);
-    }
     let mut signals = Signals { shown_as: findings.path().to_owned(), lines, columns, simulated, warnings: Vec::new() };
     if let (TIME, Some(Some(time)), false) = (wanted[0].name, signals.columns.first(), findings.any_error())
         && let Some(stretch) = stretches::chosen(time, choice, findings)
@@ -140,21 +136,6 @@ pub(crate) fn columns_of(
     Some(signals)
 }
 
-/// Times of day (s) become times since the first; after midnight they start again.
-fn since_first(time: &mut [f64]) {
-    let (mut before, mut last) = (-time.first().copied().unwrap_or_default(), f64::NEG_INFINITY);
-    for value in time {
-        if *value < last - 0.5 * DAY {
-            before += DAY;
-        }
-        last = *value;
-        *value += before;
-    }
-}
-
-/// A day, s.
-const DAY: f64 = 86_400.0;
-
 /// Numbers in each of a few lines from which a file has a line for each column.
 const COLUMNS: usize = 100;
 
@@ -164,7 +145,7 @@ const CURVES: usize = 3;
 /// Whether a file has a column of times.
 fn has_time(header: &Head, reading: &Reading) -> bool {
     let is_time = |name: &String| names::quantity(TIME).is_some_and(|time| time.fits(name).is_some());
-    reading.column(TIME).is_some() || header.names.iter().any(is_time)
+    reading.column(TIME).is_some() || header.clock().is_some() || header.names.iter().any(is_time)
 }
 
 impl Signals {

@@ -55,6 +55,11 @@ fn parse_rows(text: &str, shown_as: &str, period: f64, findings: &mut Findings) 
     if header.names.iter().all(String::is_empty) {
         return findings.refuse(codes::WAVEFORM_HEADER, None, "is empty".to_owned(), EXPECTED);
     }
+    let is_nameless = |(at, name): &(usize, &String)| name.is_empty() && columns::has_values(text, &header, *at);
+    for (at, _) in header.names.iter().enumerate().filter(is_nameless) {
+        let message = format!("column {} has values, but no name", at + 1);
+        findings.add(codes::WAVEFORM_HEADER, Some(header.line), message, EXPECTED);
+    }
     let meanings = meanings(&header, findings)?;
     let names = header.names.iter().enumerate().filter(|(_, name)| is_read(name));
     let columns = meanings.iter().zip(names);
@@ -191,6 +196,8 @@ mod tests {
         assert!(refused("pitch\n")[0].contains("is not a column of a table"));
         assert!(refused("1.0,2.0\n1,2\n")[0].contains("first line"));
         assert!(refused("time_s\n1\n2\n")[0].contains("no coordinate"));
+        assert!(refused("x_um,,z_um\n0,,2\n0,1,2\n")[0].contains("column 2 has values, but no name"));
+        assert!(parse("x_um,,z_um\n0,,2\n0,,2\n", "w.csv", 1e-3).is_ok());
     }
 
     #[test]

@@ -129,7 +129,7 @@ impl Quantity {
         let per = self.per(&unit?)?;
         match name.as_str() {
             name if name == self.plain() => Some((Fit::OtherUnit, per)),
-            name if self.also.contains(&name) => Some((Fit::OtherName, per)),
+            name if self.also.contains(&name) && !ends_with_word(header) => Some((Fit::OtherName, per)),
             _ => None,
         }
     }
@@ -214,13 +214,26 @@ fn kind(unit: &str) -> Option<(&'static str, f64)> {
 
 /// Endings of names that mean something else more often than a unit, such as `V_in`.
 const AMBIGUOUS: [&str; 6] = ["s", "m", "in", "d", "h", "min"];
+/// Those that mean something else behind other names of a quantity, too, such as `position_in`.
+const WORD_UNITS: [&str; 4] = ["in", "d", "h", "min"];
+
+/// Whether a header ends with one of [`WORD_UNITS`] and nothing marks that as a unit.
+fn ends_with_word(header: &str) -> bool {
+    let header = header.trim().to_lowercase();
+    let word = header.rsplit(['_', ' ']).next().unwrap_or_default();
+    !is_unit_marked(&header) && !header.contains(" in ") && WORD_UNITS.contains(&word)
+}
+
+/// Whether brackets, a slash or a comma separate the unit of a header.
+fn is_unit_marked(header: &str) -> bool {
+    header.trim().ends_with([')', ']']) || header.contains(['/', ','])
+}
 
 /// The unit of a header as it is written in a name such as `drive_mV`; none if it is not known, or only a letter behind a
 /// blank or `_`.
 pub(crate) fn own_unit(header: &str) -> Option<&'static str> {
     let own = parts(header).1?;
-    let is_plain = !header.trim().ends_with([')', ']']) && !header.contains(['/', ',']);
-    if is_plain && AMBIGUOUS.contains(&own.as_str()) {
+    if !is_unit_marked(header) && AMBIGUOUS.contains(&own.as_str()) {
         return None;
     }
     KINDS.into_iter().flatten().map(|(name, _)| *name).find(|name| name.to_ascii_lowercase() == own)
@@ -232,10 +245,11 @@ pub(crate) fn has_unknown_unit(header: &str) -> bool {
     unit_in_brackets(header).filter(is_short).is_some_and(|unit| kind(&unit).is_none() && unit.parse::<f64>().is_err())
 }
 
-/// `name` with a unit that is stated beside it, if it is known.
-pub(crate) fn with_unit(name: &str, unit: &str) -> String {
-    if is_unit(unit) && own_unit(name).is_none() && !has_unit(name) {
-        format!("{name} [{}]", unit.trim())
+/// `name` with a unit that is stated beside it, if it is known and not that of the name.
+pub(crate) fn with_unit(name: &str, stated: &str) -> String {
+    let own = parts(name).1.filter(|_| own_unit(name).is_some() || has_unit(name));
+    if is_unit(stated) && own.is_none_or(|own| kind(&own).is_some() && own != unit(stated)) {
+        format!("{name} [{}]", stated.trim())
     } else {
         name.to_owned()
     }
@@ -348,6 +362,12 @@ mod tests {
             ("displacement [Å]", "displacement_um", Some((Fit::OtherUnit, 1e4))),
             ("Position (mil)", "displacement_um", Some((Fit::OtherName, 1.0 / 25.4))),
             ("force_MN", "force_N", None),
+            ("position_in", "displacement_um", None),
+            ("Position in", "displacement_um", None),
+            ("t_min", "time_s", None),
+            ("displacement_in", "displacement_um", Some((Fit::OtherUnit, 1.0 / 25_400.0))),
+            ("Position [in]", "displacement_um", Some((Fit::OtherName, 1.0 / 25_400.0))),
+            ("Zeit in h", "time_s", Some((Fit::OtherName, 1.0 / 3600.0))),
             ("FORCE_mN", "force_N", Some((Fit::OtherUnit, 1e3))),
         ] {
             assert_eq!(quantity(name).unwrap().fits(header), expected, "{header}");

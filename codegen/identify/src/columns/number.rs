@@ -9,7 +9,7 @@ pub(super) fn number(field: &str, separator: u8) -> Option<(f64, Option<char>)> 
         "∞" | "+∞" => Some(f64::INFINITY),
         "-∞" => Some(f64::NEG_INFINITY),
         // Fortran's exponents.
-        _ => clock(field).or_else(|| field.replace(['D', 'd'], "e").parse().ok()),
+        _ => clock(field).map(|(_, seconds)| seconds).or_else(|| field.replace(['D', 'd'], "e").parse().ok()),
     };
     if let Some(value) = other {
         return Some((value, None));
@@ -20,9 +20,12 @@ pub(super) fn number(field: &str, separator: u8) -> Option<(f64, Option<char>)> 
     field.replace(',', ".").parse().ok().map(|value| (value, Some(',')))
 }
 
-/// Seconds since midnight of a time of day, with or without a date: `10:11:12.5`, `2024-03-05T10:11:12,5Z`,
-/// `3/5/2024 10:11:12 PM`. Two numbers are minutes and seconds if these have decimals.
-pub(super) fn clock(text: &str) -> Option<f64> {
+/// A time of day: its day, if it has a date, and seconds since midnight.
+pub(super) type Clock = (Option<i32>, f64);
+
+/// The time of day in `10:11:12.5`, `2024-03-05T10:11:12,5Z` or `3/5/2024 10:11:12 PM`. Two numbers are minutes and
+/// seconds if these have decimals.
+pub(super) fn clock(text: &str) -> Option<Clock> {
     let text = text.strip_suffix('Z').unwrap_or(text);
     let lower = text.to_ascii_lowercase();
     let (text, afternoon) = match (lower.strip_suffix("pm"), lower.strip_suffix("am")) {
@@ -31,7 +34,8 @@ pub(super) fn clock(text: &str) -> Option<f64> {
         _ => (lower.as_str(), None),
     };
     // Behind the date, without the time zone.
-    let time = text.rsplit(['t', ' ']).next()?.split(['+', '-']).next()?;
+    let (date, time) = text.rsplit_once(['t', ' ']).unwrap_or(("", text));
+    let time = time.split(['+', '-']).next()?;
     let mut parts = time.rsplit(':');
     let seconds = parts.next().filter(|part| part.starts_with(|c: char| c.is_ascii_digit()))?;
     let minutes: u32 = parts.next()?.parse().ok()?;
@@ -46,8 +50,49 @@ pub(super) fn clock(text: &str) -> Option<f64> {
         (hours @ ..12, Some(true)) => hours + 12,
         (hours, _) => hours,
     };
-    (is_time && hours < 24 && minutes < 60 && seconds < 60.0).then(|| f64::from(3600 * hours + 60 * minutes) + seconds)
+    let is_time = is_time && hours < 24 && minutes < 60 && seconds < 60.0;
+    is_time.then(|| (day(date), f64::from(3600 * hours + 60 * minutes) + seconds))
 }
+
+/// Number of the day `2024-03-05` or `5.3.2024`; none for `3/5/2024`, in which day and month may have either order.
+fn day(date: &str) -> Option<i32> {
+    let parts: Option<Vec<i32>> = date.split(['-', '/', '.']).map(|part| part.trim().parse().ok()).collect();
+    let (year, month, day) = match parts?[..] {
+        [year @ 1000..10_000, month @ 1..13, day @ 1..32] => (year, month, day),
+        [day @ 1..32, month @ 1..13, year @ 1000..10_000] if !date.contains('/') => (year, month, day),
+        _ => return None,
+    };
+    // Years that begin in March end with the leap day.
+    let (year, month) = if month > 2 { (year, month - 3) } else { (year - 1, month + 9) };
+    Some(365 * year + year / 4 - year / 100 + year / 400 + (153 * month + 2) / 5 + day)
+}
+
+/// Times since the first one of a column.
+pub(super) struct SinceFirst {
+    first: Clock,
+    /// Seconds since midnight of the last one, and midnights since the first.
+    last: f64,
+    midnights: f64,
+}
+
+impl SinceFirst {
+    pub(super) const fn new(first: Clock) -> Self {
+        Self { first, last: first.1, midnights: 0.0 }
+    }
+
+    /// Seconds from the first time to this one. Without a date, a time that falls by half a day is behind midnight.
+    pub(super) fn seconds(&mut self, (day, seconds): Clock) -> f64 {
+        if seconds < self.last - 0.5 * DAY {
+            self.midnights += 1.0;
+        }
+        self.last = seconds;
+        let days = day.zip(self.first.0).map_or(self.midnights, |(day, first)| f64::from(day - first));
+        days * DAY + (seconds - self.first.1)
+    }
+}
+
+/// A day, s.
+const DAY: f64 = 86_400.0;
 
 /// Whether a field is a date such as `2024-03-05` or `5.3.2024`.
 pub(super) fn is_date(field: &[u8]) -> bool {
@@ -85,6 +130,9 @@ mod tests {
         for bad in ["10:11", "25:00:00", "10:61:00", "1:2:3:4", "a:b:c", "::", "10:11:-5"] {
             assert_eq!(number(bad, b','), None, "{bad}");
         }
+        let days = ["2024-02-28", "29.2.2024", "2024/03/01"].map(|date| clock(&format!("{date} 0:00:00")).unwrap().0);
+        assert_eq!(days.map(|day| day.unwrap() - days[0].unwrap()), [0, 1, 2]);
+        assert_eq!(clock("3/5/2024 0:00:00"), Some((None, 0.0)));
         assert!(is_date(b"2024-03-05") && is_date(b"5.3.2024") && !is_date(b"1-2") && !is_date(b"1.2.x"));
     }
 }

@@ -136,11 +136,16 @@ mod tests {
         text.set_attr("MATLAB_class", AttrValue::AsciiString("char".into()));
         let count = outer.create_dataset("count").with_i32_data(&[7]);
         count.set_attr("units", AttrValue::AsciiString("mV".into()));
+        let drive = outer.create_dataset("drive_V").with_i32_data(&[7]);
+        drive.set_attr("units", AttrValue::AsciiString("mV".into()));
+        let time = outer.create_dataset("time_s").with_i32_data(&[7]);
+        time.set_attr("units", AttrValue::AsciiString("sec".into()));
         outer.create_dataset("matrix").with_f64_data(&[1.0, 2.0, 3.0, 4.0, 5.0, 6.0]).with_shape(&[3, 2]);
         builder.add_group(outer.finish());
         let found = contents(builder.finish().unwrap(), u64::MAX).unwrap();
         let arrays: Vec<_> = found.arrays.iter().map(|a| (a.group.as_str(), a.name.as_str(), &a.size[..])).collect();
-        assert_eq!(arrays, [("scan", "count [mV]", &[1][..]), ("scan", "matrix", &[2, 3])]);
+        let units = ["count [mV]", "drive_V [mV]", "time_s"].map(|name| ("scan", name, &[1][..]));
+        assert_eq!(arrays, [&units[..], &[("scan", "matrix", &[2, 3])]].concat());
         assert_eq!(found.others, [("operator".to_owned(), "no array of numbers that can be read".to_owned())]);
     }
 }

@@ -196,9 +196,10 @@ fn add_structs(group: &str, name: &str, fields: &[String], values: Vec<Value>, c
         let is_time = !group.is_empty() && name == "X" && title.is_none_or(|title| title.eq_ignore_ascii_case("time"));
         let title = if is_time { Some(TIME) } else { title };
         let unit = text(&["Unit", "unit"]).unwrap_or_default();
-        let title = title.map(|title| match with_unit("time", unit) {
-            time if is_time && time != "time" => time,
-            _ => with_unit(title, unit),
+        let title = title.map(|title| match unit {
+            // Whether it is known or not.
+            unit if is_time && !unit.is_empty() => format!("time [{unit}]"),
+            unit => with_unit(title, unit),
         });
         let element = if count > 1 { format!("{name}({number})") } else { name.to_owned() };
         for (field, value) in own {

@@ -56,7 +56,7 @@ impl<'a> Objects<'a> {
         place
     }
 
-    /// Takes an object from the list, or changes its layout there. It keeps its order as long as it is given.
+    /// Takes an object from the list, or changes its layout there. An object keeps its place while every segment lists it.
     fn list(&mut self, place: usize, layout: Option<(u32, usize)>) -> Result<(), String> {
         let object = &mut self.all[place];
         let order = object.order.filter(|order| *order >= self.first);
@@ -161,6 +161,9 @@ impl Objects<'_> {
         let mut at = 0;
         for place in self.listed.values() {
             let Object { kind, size, values, .. } = &mut self.all[*place];
+            if is_interleaved && *kind == TEXT {
+                return Err("it has texts among interleaved numbers: save it with each channel in one piece".to_owned());
+            }
             let own = if is_interleaved { width(*kind)? } else { *size };
             let from = at;
             at += own;
@@ -216,7 +219,9 @@ pub(super) fn contents(file: &[u8], limit: u64) -> Result<Contents, Refusal> {
         cut += chunks.remainder().len();
         if is_interleaved {
             let rest = &values[..values.len() - chunks.remainder().len()];
-            objects.add(Bytes { rest, ..file }, true, &mut space)?;
+            if !rest.is_empty() {
+                objects.add(Bytes { rest, ..file }, true, &mut space)?;
+            }
             continue;
         }
         for rest in chunks {
@@ -287,11 +292,12 @@ mod tests {
     #[test]
     fn segments_take_time_for_their_own_changes() {
         let word = |value: u32| value.to_le_bytes();
-        let segment = |objects: &[u8], values: &[u8]| {
+        let form = |has: u32, objects: &[u8], values: &[u8]| {
             let lengths = [(objects.len() + values.len()) as u64, objects.len() as u64].map(u64::to_le_bytes).concat();
-            let has = OBJECTS | if values.is_empty() { 0 } else { VALUES };
             [b"TDSm", &word(has)[..], &word(4713), &lengths, objects, values].concat()
         };
+        let segment =
+            |objects: &[u8], values: &[u8]| form(OBJECTS | if values.is_empty() { 0 } else { VALUES }, objects, values);
         let channel = |name: u32, count: u64| {
             let path = format!("/'g'/'{name}'");
             let layout = [&word(20)[..], &word(1), &word(1), &count.to_le_bytes(), &word(0)].concat();
@@ -305,7 +311,17 @@ mod tests {
         let found = contents(&[many, again.repeat(400_000)].concat(), u64::MAX).unwrap();
         let (first, second) = (&found.arrays[0].values, &found.arrays[1].values);
         assert!(first.len() == 400_001 && first[400_000] == 8.0 && second.is_empty());
+        // Interleaved, without values.
+        let channels: Vec<u8> = (0..9_000).flat_map(|name| channel(name, 1)).collect();
+        let many = segment(&[&word(9_000)[..], &channels].concat(), &[7; 9_000]);
+        let none = form(VALUES | INTERLEAVED, &[], &[]);
+        let found = contents(&[many, none.repeat(200_000)].concat(), u64::MAX).unwrap();
+        assert!(found.arrays.len() == 9_000 && found.arrays[8_999].values == [7.0]);
         assert!(begun.elapsed().as_secs() < 10, "{:?}", begun.elapsed());
+        let texts = [&word(8)[..], b"/'g'/'t'", &word(28), &word(TEXT), &word(1), &[1, 0, 0, 0, 0, 0, 0, 0].repeat(2)];
+        let objects = [&word(2)[..], &channel(0, 1), &texts.concat(), &word(0)].concat();
+        let found = contents(&form(OBJECTS | VALUES | INTERLEAVED, &objects, &[7]), u64::MAX).map(|_| ()).unwrap_err();
+        assert!(matches!(found, Refusal::Because(why) if why.contains("texts among interleaved numbers")));
         let long = [&word(1)[..], &word(2000), &[b'a'; 2000], &[0; 8]].concat();
         let found = contents(&segment(&long, &[]), u64::MAX).map(|_| ()).unwrap_err();
         assert!(matches!(found, Refusal::Because(why) if why.contains("longer than 1024 bytes")));

@@ -9,6 +9,8 @@ pub(crate) struct Scaled {
     pub(crate) column: String,
     /// To the unit of the quantity.
     pub(crate) conversion: Conversion,
+    /// Number of the factor's units in one of the quantity's.
+    pub(crate) per: f64,
     /// The column's unit, such as the V of um/V.
     pub(crate) denominator: Option<String>,
 }
@@ -51,6 +53,7 @@ pub(super) fn parse(text: &str, quantity: &Quantity, per: Option<f64>) -> Result
     Ok(Some(Scaled {
         column: column.trim().to_owned(),
         conversion: Conversion { per: 1.0, scale: Some([factor / factor_per, offset / offset_per]) },
+        per: factor_per,
         denominator: denominator.map(|unit| unit.trim().to_owned()),
     }))
 }

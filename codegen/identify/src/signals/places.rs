@@ -84,9 +84,9 @@ impl Search<'_> {
 
     /// The column that the user chose. Its name may look like a number or like a scale.
     fn chosen(&self, choice: &ColumnChoice, name: &'static str) -> Result<Column<'static>, Problem> {
+        self.check_unit(choice)?;
         let plain = choice.conversion.and_then(|conversion| Some((self.at(&choice.column)?, conversion)));
         if let Some((at, conversion)) = plain {
-            self.check_unit(at, name, conversion)?;
             return Ok(Column { at, name, conversion });
         }
         let scaled = choice.scaled.as_ref().and_then(|scaled| Some((self.at(&scaled.column)?, scaled)));
@@ -104,24 +104,31 @@ impl Search<'_> {
         Ok(Column { at, name, conversion: Conversion { per, ..scaled.conversion } })
     }
 
-    /// The unit in the header of a column, if the user's name for it has another, and whether that is of the same kind.
-    fn other_unit(&self, at: usize, name: &str, conversion: Conversion) -> Option<(&'static str, bool)> {
+    /// The column that the user gives another unit than its header does, and that of the header.
+    fn other_unit(&self, choice: &ColumnChoice) -> Option<(usize, &'static str)> {
+        let named = choice.conversion.and_then(|conversion| Some((self.at(&choice.column)?, conversion.per)));
+        let scaled = choice.scaled.as_ref().filter(|scaled| named.is_none() && scaled.denominator.is_none());
+        let (at, given) = named.or_else(|| scaled.and_then(|scaled| Some((self.at(&scaled.column)?, scaled.per))))?;
         let unit = names::own_unit(self.header.names.get(at)?)?;
-        let per = names::quantity(name)?.per(unit);
-        (per != Some(conversion.per)).then_some((unit, per.is_some()))
+        let per = names::quantity(choice.quantity)?.per(unit);
+        // A factor may be per unit of another kind.
+        (per != Some(given) && (per.is_some() || scaled.is_none())).then_some((at, unit))
     }
 
-    fn check_unit(&self, at: usize, name: &'static str, conversion: Conversion) -> Result<(), Problem> {
-        let Some((unit, is_same_kind)) = self.other_unit(at, name, conversion) else { return Ok(()) };
-        let message = format!("`--columns` names `{}` for `{name}`, but its unit is {unit}", self.header.names[at]);
+    fn check_unit(&self, choice: &ColumnChoice) -> Result<(), Problem> {
+        let Some((at, unit)) = self.other_unit(choice) else { return Ok(()) };
+        let (header, name) = (&self.header.names[at], choice.quantity);
+        let message = format!("`--columns` names `{header}` for `{name}`, but its unit is {unit}");
         // Every entry with the unit of its column.
         let with_unit = |choice: &ColumnChoice| {
-            let other = choice.conversion.zip(self.at(&choice.column));
-            let other = other.filter(|(conversion, at)| self.other_unit(*at, choice.quantity, *conversion).is_some());
-            other.map_or_else(|| choice.text.clone(), |(_, at)| self.entry(choice.quantity, at))
+            self.other_unit(choice).map_or_else(|| choice.text.clone(), |(at, _)| self.entry(choice.quantity, at))
         };
         let all: Vec<String> = self.reading.chosen().map(with_unit).collect();
-        let rest = if is_same_kind { "" } else { " with the size of its unit in place of 1" };
+        let rest = match names::quantity(name).and_then(|quantity| quantity.per(unit)) {
+            None => " with the size of its unit in place of 1".to_owned(),
+            Some(_) if self.at(&choice.column).is_none() => format!(", followed by scale and offset in {unit}"),
+            Some(_) => String::new(),
+        };
         let help = format!("give `--columns {}`{rest}", shell::quoted(&all.join(",")));
         Err((codes::RECORD_HEADER, message, help))
     }
@@ -224,6 +231,7 @@ impl Search<'_> {
             Shape::Rising | Shape::Clock if name == TIME => 20,
             Shape::Unknown => 0,
             Shape::Counting | Shape::Other if name == TIME => -200,
+            Shape::Constant if name != TIME => -20,
             Shape::Constant | Shape::Clock => -200,
             Shape::Counting => -100,
             Shape::Rising | Shape::Other => 0,
@@ -347,6 +355,10 @@ mod tests {
             (
                 "a,H (Oe),M (emu)\n0,5,1\n1,7,2\n2,5,4\n",
                 "`--columns 'drive=H (Oe)*1 V,displacement=M (emu)*1 um' --rate HZ`",
+            ),
+            (
+                "Time (s),Voltage (V),Gauge (V)\n0,0,1\n1,0,2\n2,0,4\n",
+                "`--columns 'drive_V=Voltage (V),displacement=Gauge (V)*1 um/V'`",
             ),
             ("a,b,c\n4,5,0\n3,7,0\n2,5,0\n", "`--columns drive_V=a,displacement_um=b --rate HZ`"),
             ("X_Value,Voltage,Weg\n0,0,0\n1,1,0\n2,0,0\n", "`--columns drive_V=Voltage,displacement_um=Weg`"),

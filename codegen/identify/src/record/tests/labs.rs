@@ -46,6 +46,12 @@ fn structs_of_dspace_are_read() {
     let y = structs("", &["Name", "Data", "Unit", "Description"], &signals);
     let milliseconds: Vec<f64> = values(0).iter().map(|value| 1e3 * value).collect();
     let x = structs("", &["Data", "Unit"], &[vec![doubles("", [1, 240], &milliseconds), text("", "ms")]]);
+    let ticks = structs("", &["Data", "Unit"], &[vec![doubles("", [1, 240], &milliseconds), text("", "ticks")]]);
+    let found = read(&mat::file(&[structs("exp", &["X", "Y"], &[vec![ticks, y.clone()]])]), &[], None).unwrap_err();
+    assert!(
+        found[0].message.contains("`time_s` is missing") && found[0].message.contains("`time [ticks]`"),
+        "{found:?}"
+    );
     let file = mat::file(&[structs("exp", &["X", "Y"], &[vec![x, y]])]);
     let found = read(&file, &[], None).unwrap_err();
     assert!(found[0].help.contains("'drive_V=Amp/Out [V],displacement_nm=Gauge/Out [nm]'"), "{found:?}");
@@ -149,13 +155,25 @@ fn numpy_gzip_and_utf_16_are_read() {
 
 #[test]
 fn a_scaled_gauge_is_read() {
-    let volts = file("time_s,drive_V,CH2 (mV),y", |[t, u, y]| format!("{t},{u},{},{y}", 1e3 * (y - 0.3) / 5.0));
-    for scale in ["displacement=CH2 (mV)*5 um/V+0.3 um", "displacement=3*5 um/V+300 nm", "displacement_nm=y*1e3"] {
+    let volts = file("time_s,drive_V,CH2 (mV),y,Gauge (nm)", |[t, u, y]| {
+        format!("{t},{u},{},{y},{}", 1e3 * (y - 0.3) / 5.0, 1e3 * y)
+    });
+    for scale in [
+        "displacement=CH2 (mV)*5 um/V+0.3 um",
+        "displacement=3*5 um/V+300 nm",
+        "displacement_nm=y*1e3",
+        "displacement_nm=Gauge (nm)+0 um",
+        "displacement=Gauge (nm)*1 nm",
+        "displacement=Gauge (nm)*1e-3 um/nm",
+    ] {
         assert_same(scale, read(volts.as_bytes(), &[scale], None));
     }
-    for (wrong, help) in
-        [("drive_V=CH2 (mV)", "drive_mV=CH2 (mV)"), ("displacement_um=CH2 (mV)", "displacement=CH2 (mV)*1 um/mV")]
-    {
+    for (wrong, help) in [
+        ("drive_V=CH2 (mV)", "drive_mV=CH2 (mV)"),
+        ("displacement_um=CH2 (mV)", "displacement=CH2 (mV)*1 um/mV"),
+        ("displacement_um=Gauge (nm)+0.3", "displacement_nm=Gauge (nm)'`, followed by scale and offset in nm"),
+        ("displacement=Gauge (nm)*1 um", "displacement_nm=Gauge (nm)'`, followed"),
+    ] {
         let found = read(volts.as_bytes(), &[wrong], None).unwrap_err();
         assert!(found.iter().any(|one| one.code == "E0504" && one.help.contains(help)), "{found:?}");
     }
@@ -179,6 +197,11 @@ fn the_data_table_of_a_text_is_found() {
     let lines = (0..3).map(|k| values(k).iter().map(f64::to_string).collect::<Vec<_>>().join("\t")).collect::<Vec<_>>();
     let found = read(lines.join("\n").as_bytes(), &[], None).unwrap_err();
     assert!(found[0].message.contains("3 lines of 240 numbers: rows and columns are exchanged"), "{found:?}");
+    let others = (0..300).map(|k| format!(",c{k}")).collect::<String>();
+    let wide = file(&format!("time_s,drive_V,displacement_um{others}"), |[t, u, y]| {
+        format!("{t},{u},{y}{}", ",0".repeat(300))
+    });
+    assert_same("wide", read(wide.as_bytes(), &[], None));
     let fourth = read_as(all.as_bytes(), &series(list, "4")).unwrap();
     assert_eq!((fourth.time.len(), fourth.time[0], fourth.warnings.len()), (141, 0.099, 0));
 }
@@ -224,6 +247,32 @@ fn stretches_between_gaps_and_joined_runs_are_records() {
     let whole = file("time_s,drive_V,displacement_um", |[t, u, y]| format!("{t},{u},{y}"));
     let joined = whole.clone() + &whole.lines().skip(1).take(150).collect::<Vec<_>>().join("\n");
     assert!(note(&assert_same("joined", read(joined.as_bytes(), &[], None))).contains("starts again"));
+}
+
+#[test]
+fn times_of_day_are_of_the_time_column() {
+    let clock = |first: &str, later: &str| {
+        file("Timestamp,drive_V,displacement_um", |[t, u, y]| {
+            let date = if t < 0.1 { first } else { later };
+            format!("{date} 10:00:00.{:03.0},{u},{y}", 1e3 * t)
+        })
+    };
+    let one = clock("2024-03-04", "2024-03-04");
+    // The unit of the name is not that of the clock.
+    assert_same("minutes", read(one.replace("Timestamp", "Time (min)").as_bytes(), &[], None));
+    let lines: Vec<&str> = one.lines().skip(1).collect();
+    let apart = lines.chunks(80).map(|lines| lines.join("\n")).collect::<Vec<_>>().join("\n\n");
+    let names = "Timestamp,drive_V,displacement_um";
+    assert_same("blank lines", read(format!("{names}\n{apart}\n").as_bytes(), &[], None));
+    let record = read(clock("2024-03-04", "2024-03-07").as_bytes(), &[], None).unwrap();
+    assert!(record.time.len() == 140 && note(&record).contains("stretch without, from 259200.1"), "{}", note(&record));
+    // Elsewhere they are no numbers.
+    let found = read(file(names, |[t, u, _]| format!("{t},{u},0:21.35")).as_bytes(), &["time_s=1"], None).unwrap_err();
+    assert!(found[0].code == "E0506" && found[0].message.contains("`0:21.35`"), "{found:?}");
+    let found = read(one.replace("00:00.", "00:00,").as_bytes(), &[], None).unwrap_err();
+    assert!(found[0].code == "E0506" && found[0].message.contains("comma before the decimals"), "{found:?}");
+    let semicolons = one.replace(',', ";").replace("00:00.", "00:00,");
+    assert_same("semicolons", read(semicolons.as_bytes(), &[], None));
 }
 
 #[test]
