@@ -33,6 +33,8 @@ pub(crate) use family::TIMES;
 pub use family::WIDENED_PLAYS;
 pub use file::{read_leg_csv, write_leg_csv};
 
+/// Least share of the play without a threshold in all weights: what is left of the slope after a turn.
+const LEAST_FIRST: f64 = 1e-3;
 /// Number of coefficients of a read-out: powers 1 to 5.
 const READ_OUT: usize = 5;
 /// Largest number of creep operators, as in `hysteresis.creep_times`.
@@ -92,11 +94,11 @@ pub struct Around {
     pub plays: Option<WidenedPlays>,
 }
 
-/// Plays whose thresholds r_i are r_i (1 + κ ln(1 + |v|/v₀)), where v is the rate of the drive behind a low-pass filter.
+/// Plays whose thresholds at rest, r_i, become r_i (1 + κ ln(1 + |v|/v₀)), where v is the rate of the drive behind a low-pass filter.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct WidenedPlays {
-    /// κ > 0.
+    /// κ, 0 to 1.
     pub kappa: f64,
     /// v₀, V/s.
     #[serde(rename = "v0_V_per_s")]
@@ -150,9 +152,6 @@ impl WidenedPlays {
         rates && counts && rise && thresholds[0] == 0.0 && carried && weights[0] >= LEAST_FIRST * sum
     }
 }
-
-/// Least weight of the play without a threshold, of all weights: what is left of the slope after a turn.
-const LEAST_FIRST: f64 = 1e-3;
 
 impl Around {
     /// The read-out is also used beyond both ends of the travel, up to this share of it.

@@ -295,7 +295,7 @@ impl<'a> Data<'a> {
     /// Plays that widen: κ, creep and thresholds by turns.
     fn widened(&self, family: Family, saturated: bool) -> Option<(Problem<'_>, Solution)> {
         let mut near: Option<Shape> = None;
-        let (mut problem, mut solution) = widest(&FIRST_WIDENINGS, 3, |kappa| {
+        let (mut problem, mut solution) = search_kappa(&FIRST_WIDENINGS, 3, |kappa| {
             let problem = Problem::new(&self.samples, family, PLAYS, saturated, kappa);
             let solution = problem.search(near.as_ref(), None)?;
             near = Some(solution.shape);
@@ -307,7 +307,7 @@ impl<'a> Data<'a> {
             let fine = Problem::new(&self.samples, family, FINE_PLAYS, saturated, kappa);
             let found = fine.at(shape, None)?;
             let r = merged(fine.thresholds(), fine.parts(&found.values).0);
-            (problem, solution) = widest(&[kappa], rounds, |kappa| {
+            (problem, solution) = search_kappa(&[kappa], rounds, |kappa| {
                 let problem = Problem::with_thresholds(&self.samples, family, r.clone(), saturated, kappa);
                 problem.search(Some(&shape), None).map(|solution| (problem, solution))
             })?;
@@ -402,7 +402,7 @@ impl<'a> Data<'a> {
 }
 
 /// The fit with the κ of the least residual: of `from`, then of steps about the best that become shorter.
-fn widest<'p>(
+fn search_kappa<'p>(
     from: &[f64],
     rounds: i32,
     mut fitted: impl FnMut(f64) -> Option<(Problem<'p>, Solution)>,
@@ -460,11 +460,11 @@ fn model_of(problem: &Problem, solution: &Solution, plane: &Plane) -> Option<Leg
     let Problem { family, unit, .. } = *problem;
     let (weights, taken, constant, read_out) = problem.parts(&solution.values);
     let [low, high] = plane.range;
-    let r = problem.thresholds().to_vec();
+    let r = problem.thresholds();
     // Σ f_i at plays that `place` gives, µm.
     let sum = |place: &dyn Fn(f64) -> f64| {
         let (mut sum, mut weights) = (0.0, weights.iter());
-        for r in &r {
+        for r in r {
             of_play(family, plane.range, *r, place(*r), &mut |value| {
                 sum += value * weights.next().copied().unwrap_or(0.0);
             });
@@ -499,15 +499,14 @@ fn model_of(problem: &Problem, solution: &Solution, plane: &Plane) -> Option<Leg
         gamma,
         rest_um: 0.0,
         creep: creep.terms(),
-        plays: None,
+        plays: family.widens.then(|| WidenedPlays {
+            kappa: problem.kappa,
+            v0: V0,
+            lag_s: RATE_LAG,
+            thresholds: r.to_vec(),
+            weights: weights.to_vec(),
+        }),
     };
-    around.plays = family.widens.then(|| WidenedPlays {
-        kappa: problem.kappa,
-        v0: V0,
-        lag_s: RATE_LAG,
-        thresholds: r.clone(),
-        weights: weights.to_vec(),
-    });
     let saturated = if taken > 0.0 { taken / plus } else { 0.0 };
     around.rest_um = around.state_after(saturated, low - high);
     let rest = sum(&|r| low + r) - around.rest_um + constant;
