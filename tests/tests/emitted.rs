@@ -255,10 +255,10 @@ fn an_output_builds_offline_and_its_example_and_manual_are_good() {
             .collect();
         assert_eq!(example(&manual.join("\n")), example(&files["README.md"]));
         let all = [&["check", "--workspace"][..], &["test", "--doc", "--package=controller"], &["doc", "--no-deps"]];
-        // The manual's example in the short run, its pages in the full run.
-        for arguments in all.into_iter().take(specgen_tests::length(2, 3)) {
+        // The manual's example is built and run, and its pages are made, in the full run.
+        for arguments in &all[..specgen_tests::length(1, 3)] {
             let run = Command::new(env!("CARGO"))
-                .args(arguments)
+                .args(*arguments)
                 .args(["--offline", "--quiet"])
                 .current_dir(&dir)
                 .env("CARGO_HOME", dir.join("empty"))

@@ -129,6 +129,7 @@ fn no_flipped_bit_is_believed(name: &str, spec: &str, edits: &[(&str, &str)], fl
 }
 
 #[test]
+#[ignore = "long: a program built from nothing; that constants and settings have their checksum is in the short run"]
 fn no_flipped_bit_of_a_platform_is_believed() {
     no_flipped_bit_is_believed("integrity-platform", "reference.toml", &[], specgen_tests::length(5, 40));
 }

@@ -11,10 +11,12 @@ use specgen::diagnostic::{Code, Diagnostic, codes, render};
 use specgen::spec::keys::{Item, Key, Kind, Presence, Section, Shape};
 use specgen::spec::{self, SpecSource};
 use specgen::stability;
+use specgen_tests::length;
 
 #[test]
 fn every_spec_of_the_repository_is_accepted_without_a_warning_and_stable() {
-    for path in spec_files() {
+    // Every fourth in the short run; the others are compiled by other tests.
+    for path in spec_files().into_iter().step_by(length(4, 1)) {
         let source = SpecSource::read(&path).expect("readable");
         let (model, findings) = spec::load(&source);
         assert!(findings.is_empty(), "{}", render(&findings, &source, false));

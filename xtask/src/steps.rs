@@ -203,11 +203,14 @@ pub fn mutants(root: &Path, sample: &Sample) -> ExitCode {
 fn checked(root: &Path) -> Outcome {
     let kernels = ["law", "runtime", "link", "hal", "board", "rt"].map(|name| format!("--package=specgen-{name}"));
     let kernels: Vec<&str> = kernels.iter().map(String::as_str).chain(["--package=host-sim"]).collect();
-    let readers = ["--package=specgen-tests", "--", "spec_", "fuzz_", "identify_bad_input"];
-    let compiler = ["language", "identify", "compiler", "studies"].map(|name| format!("--package=specgen-{name}"));
-    let compiler: Vec<&str> = compiler.iter().map(String::as_str).chain(["--lib"]).collect();
-    for scope in [&kernels[..], &compiler, &readers] {
-        let test = [&["test", "--profile=checked", "--locked", "--quiet"], scope].concat();
+    // The same packages for both, so that cargo compiles what they share once: other packages would mean other features.
+    let compiler =
+        ["language", "identify", "compiler", "studies", "tests"].map(|name| format!("--package=specgen-{name}"));
+    let compiler: Vec<&str> = compiler.iter().map(String::as_str).collect();
+    let libraries = [&compiler[..], &["--lib"]].concat();
+    let readers = [&compiler[..], &["--test=all", "--", "spec_", "fuzz_", "identify_bad_input"]].concat();
+    for scope in [kernels, libraries, readers] {
+        let test = [&["test", "--profile=checked", "--locked", "--quiet"], &scope[..]].concat();
         let outcome = expect_success(cargo(root, &test), "see the test above");
         if !matches!(outcome, Outcome::Passed) {
             return outcome;

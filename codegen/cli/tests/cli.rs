@@ -39,9 +39,13 @@ fn arguments_that_make_no_sense_are_usage_errors() {
     for (number, (case, _)) in cases::read(&repository().join("tests/cases/usage_errors.txt")).iter().enumerate() {
         let (words, word) = (shlex::split(&case.title).unwrap(), case.one('w').unwrap());
         let arguments: Vec<&str> = words.iter().skip(1).map(String::as_str).collect();
+        // In the short run one of four as JSON, and of the others every second one as text.
+        let is_json = number.is_multiple_of(support::length(4, 1));
+        if support::length(!is_json && number.is_multiple_of(2), false) {
+            continue;
+        }
         folder.run(&arguments).says(2, &["error: ", word]);
-        // As JSON, one of four in the short run.
-        if !number.is_multiple_of(support::length(4, 1)) {
+        if !is_json {
             continue;
         }
         let document = folder.json(&arguments);
@@ -211,13 +215,16 @@ fn records_at_two_rates_are_written_and_identified_together() {
     let last = folder.read("leg-fast.csv").lines().last().unwrap().to_owned();
     // 500 V at 640 V/s, less what makes whole rows of 0.1 ms.
     assert!(last.starts_with("0.782,0,"), "{last}");
-    let both = ["identify", "leg.csv", "leg-fast.csv", "--drive", "0:100", "--grid", "8", "--model", "auto"];
+    // In the short run a table alone; every family takes seconds.
+    let model = support::length("preisach", "auto");
+    let both = ["identify", "leg.csv", "leg-fast.csv", "--drive", "0:100", "--grid", "8", "--model", model];
     let document = folder.json(&[&both[..], &["--validate", "leg-arbitrary.csv"]].concat());
     let codes: Vec<String> = document.findings().iter().map(|finding| finding["code"].to_string()).collect();
     assert!(document.code == 0 && codes.is_empty(), "{codes:?}");
     let result = &document.value["result"];
     assert_eq!(result["report"]["reversal_curves"], 12);
-    assert!(result["scores"][0]["arbitrary_rms"].as_f64().is_some_and(|rms| rms > 0.0), "{result}");
+    let scored = result["scores"][0]["arbitrary_rms"].as_f64().is_some_and(|rms| rms > 0.0);
+    assert_eq!(scored, model == "auto", "{result}");
     assert_eq!(result["validation"]["record"], "leg-arbitrary.csv");
     // Drives for a generator: each rests at the lowest voltage, and returns to it.
     let drive = ["forc", "-o", "drive.csv", "--drive-only", "--drive", "-90:90", "--sampling", "2000", "--grid", "4"];

@@ -95,7 +95,7 @@ fn prepared() -> Folder {
 fn examples_run_as_they_stand() {
     let folder = prepared();
     let mut lines: Vec<Line> = Vec::new();
-    // Other tests run these: `export`, `fmu`, `tune`, `robust`, `report`, the tutorials in `guide` and, in the full run,
+    // Other tests run these: `export`, `fmu`, `tune`, `robust`, `refit`, `report`, the tutorials in `guide` and, in the full run,
     // `platform_tables`.
     let elsewhere = [
         "sim platform.toml --frequency",
@@ -109,6 +109,7 @@ fn examples_run_as_they_stand() {
         "learning.toml --response",
         "tune legs.toml --evaluations",
         "robust legs.toml --draws",
+        "identify run.rec --spec",
         "robust merge",
         "legs.toml --paper",
     ];

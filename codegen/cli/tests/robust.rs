@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::fs;
 
-use crate::support::{Folder, Run, contents, length, repository};
+use crate::support::{Folder, Run, contents, damping_design, length, repository};
 use host_sim::plant::REFERENCE_LEG;
 use serde_json::Value;
 use specgen::compile::compile;
@@ -97,8 +97,9 @@ fn a_leg_that_is_short_of_voltage_is_said_to_be_at_its_limit() {
     assert!(run.stdout.contains(", a leg at its limit in "), "{}", run.stdout);
 }
 
-/// Four in the short run; 100 on legs of each class in the full one.
+/// 100 on legs of each class.
 #[test]
+#[ignore = "long: machines with a structure; that every mode of its range is tolerated is in the short run"]
 fn random_machines_with_a_mode_soft_joints_a_cable_mains_drift_and_jitter_are_stable() {
     let folder = Folder::new();
     // Plays that widen with the rate: by 20 % at 500 V/s.
@@ -370,7 +371,7 @@ fn learned_errors_have_a_row_a_gate_and_parts() {
         1,
     );
     let text = text.replacen("stale_ticks  = 10", "stale_ticks = 3", 1);
-    let text = text + "\n[robust]\nmax_learned = \"1 nm\"\n";
+    let text = text + "\n[robust]\nmax_learned = \"1 nm\"\n" + &damping_design();
     fs::write(folder.path("learning.toml"), text).unwrap();
     let fixed =
         ["mass", "stiffness", "damping", "hysteresis", "creep", "lag", "noise"].map(|name| format!("{name}=1:1"));

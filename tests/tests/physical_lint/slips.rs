@@ -47,6 +47,7 @@ fn share_of_first(kind: &str) -> usize {
 }
 
 #[test]
+#[ignore = "long: hundreds of slips, each compiled; those of the first hour are in the short run"]
 fn slips_are_found_at_their_key() {
     let dir = specgen_tests::repository().join("specs");
     let bases: Vec<Base> =
@@ -124,9 +125,10 @@ fn the_comparison_knows_a_wrong_key() {
 }
 
 #[test]
+#[ignore = "long: a hundred platforms; some of another seed are in the short run"]
 fn plausible_platforms_are_not_refused() {
     // The second seed was never looked at while rules were made.
-    for seed in [20_261_122, 7].into_iter().take(length(1, 2)) {
+    for seed in [20_261_122, 7] {
         are_accepted(seed);
     }
 }

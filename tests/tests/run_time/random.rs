@@ -19,6 +19,8 @@ enum Addition {
     Text(String),
 }
 
+const DAMPING: &str = "active damping";
+
 /// A part of a spec that may be left out, and the chance that it is asked for, in quarters.
 struct Part {
     name: &'static str,
@@ -132,7 +134,7 @@ fn platform(random: &mut ChaCha8Rng, base: &Compilation) -> Vec<Part> {
     let text = |name, quarters, text: &str| Part { name, quarters, added: vec![Addition::Text(text.to_owned())] };
     vec![
         behind("mode", 2, "[control]", format!("mode = \"{}\"", one_of(random, &["p", "f", "p/f"]))),
-        behind("active damping", 2, "[control]", "active_damping = true"),
+        behind(DAMPING, 2, "[control]", "active_damping = true"),
         behind("no notch", 1, "[control]", "notch = false"),
         behind("hand-over", 2, "[control]", "hand_over = true"),
         behind("learning", 2, "[control]", format!("correction = \"{:.3} um\"", 0.1 * x)),
@@ -192,11 +194,11 @@ pub fn emitted(index: usize) -> (Emitted, Vec<&'static str>) {
     };
     let mut parts = common(&mut random, &accepted, &folder);
     parts.extend(if accepted.ir.task_space.is_some() { platform(&mut random, &accepted) } else { legs(&mut random) });
+    parts.retain(|part| random.next_u64() % 4 < part.quarters);
+    // Last, because each compilation with it searches its design for seconds.
+    parts.sort_by_key(|part| part.name == DAMPING);
     let mut names = Vec::new();
     for part in parts {
-        if random.next_u64() % 4 >= part.quarters {
-            continue;
-        }
         let more = with(&text, &part);
         if let Some(compiled) = compiled(&more, &folder) {
             (text, accepted) = (more, compiled);

@@ -524,7 +524,8 @@ fn no_sample_of_a_machine_without_a_fault_is_replaced() {
 fn spoiled_samples_have_the_same_bits_on_the_mcu() {
     let machines =
         [("supervisor-samples-f32", &[F32][..], Mcu::Mps2An386), ("supervisor-samples", &[], Mcu::Mps2An500)];
-    for &(name, edits, mcu) in &machines[..specgen_tests::length(1, 2)] {
+    // In the short run the image that other tests have built.
+    for &(name, edits, mcu) in &machines[specgen_tests::length(1..2, 0..2)] {
         let emitted = Emitted::new(name, "reference.toml", edits);
         let Some(image) = emitted.image(mcu) else { return };
         let mut machine = Loop::new(&emitted, &LegParameters::reference(), 3);

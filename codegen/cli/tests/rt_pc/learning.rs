@@ -30,7 +30,7 @@ fn a_motion_is_learned_over_the_link_and_played_under_what_was_learned() {
         "\"10 Hz\"",
         1,
     );
-    std::fs::write(&spec, text).unwrap();
+    std::fs::write(&spec, text + &crate::support::damping_design()).unwrap();
     let bench = Bench::of(&spec);
     let link = bench.path("learn.link");
     let mut command = bench.command("learn.rec");

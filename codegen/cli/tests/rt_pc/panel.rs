@@ -361,6 +361,7 @@ impl Relay {
 }
 
 #[test]
+#[ignore = "long: another session; a host that is lost is in the short run"]
 fn the_panel_reconnects_after_a_cut_that_is_a_fault_and_after_a_restart_and_the_same_page_is_in_control() {
     let bench = Bench::named("reference.toml", "reconnect");
     let [link, front] = ["program.link", "front.link"].map(|name| bench.path(name));
@@ -401,11 +402,6 @@ fn the_panel_reconnects_after_a_cut_that_is_a_fault_and_after_a_restart_and_the_
     page.runs();
     page.say(&json!({ "do": "ramp-down" }));
     page.phase("disarmed");
-    if crate::support::length(true, false) {
-        panel.end();
-        bench.check(&running.end(Signal::TERM), "cut.rec");
-        return crate::support::skipped("only in the full run: the program of the machine ends and starts again");
-    }
 
     // The program ends and starts again; address, token and control stay. A stop from meanwhile is sent.
     let output = running.end(Signal::TERM);
@@ -495,6 +491,7 @@ fn miswired_machine(spec: &Path, digest: &str, name: &str) -> Background {
 }
 
 #[test]
+#[ignore = "long: another session; every fault of the wiring is named by the supervisor in the short run"]
 fn the_wiring_check_names_gauges_that_are_exchanged_or_turned_and_lets_a_good_machine_hold() {
     let bench = Bench::named("reference.toml", "check");
     let text = fs::read_to_string(&bench.spec).unwrap();
@@ -512,9 +509,7 @@ fn the_wiring_check_names_gauges_that_are_exchanged_or_turned_and_lets_a_good_ma
     let records = bench.spec.with_file_name("records");
     fs::create_dir(bench.path("records")).unwrap();
     fs::copy(records.join("reference-forc.csv"), bench.path("records/reference-forc.csv")).unwrap();
-    // In the short run, only the swapped ones.
-    let tried = crate::support::length(1..2, 0..3);
-    for (number, (spec, expected)) in cases.into_iter().enumerate().filter(|(number, _)| tried.contains(number)) {
+    for (number, (spec, expected)) in cases.into_iter().enumerate() {
         assert!(number == 0 || *spec != text, "the spec is another");
         let path = bench.path(&format!("check-{number}.toml"));
         fs::write(&path, spec).unwrap();

@@ -14,7 +14,7 @@ use super::{Bench, ProcessGuard, wait_for};
 const REFUSED: &str = ": faulted: wiring, ";
 
 #[test]
-#[ignore = "long: another session; a page is told of a fault in the short run"]
+#[ignore = "long: another session; every fault of the wiring is named by the supervisor in the short run"]
 fn every_single_fault_of_gauges_and_legs_is_refused_and_named() {
     let bench = Bench::named("reference.toml", "wiring");
     let faults: Vec<Finding> = single_faults();

@@ -268,6 +268,13 @@ impl Drop for Background {
     }
 }
 
+/// The stored active damping of every spec with the platform, period and lags of `reference.toml`. Without it, each command on a spec
+/// with active damping searches a design for seconds.
+pub fn damping_design() -> String {
+    let text = fs::read_to_string(repository().join("specs/features/platform-damping.toml")).unwrap();
+    format!("\n[control.design]\n{}", text.split_once("[control.design]\n").unwrap().1)
+}
+
 /// Selects the short value, or the long one in the full run.
 pub fn length<T>(short: T, long: T) -> T {
     if std::env::var_os("SPECGEN_FULL").is_some() { long } else { short }
