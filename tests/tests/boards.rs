@@ -52,7 +52,7 @@ const SHORT: (&str, &str) = (
 const H743: Board = Board {
     name: "board-h743",
     folder: "stm32h743",
-    flash: 116 * 1024,
+    flash: 118 * 1024,
     ram: 44 * 1024,
     stack: 16 * 1024,
     tightly: Some(0x1_0000),
@@ -61,7 +61,7 @@ const H743: Board = Board {
 const F446: Board = Board {
     name: "board-f446",
     folder: "stm32f4",
-    flash: 106 * 1024,
+    flash: 107 * 1024,
     ram: 32 * 1024,
     stack: 12 * 1024,
     tightly: None,

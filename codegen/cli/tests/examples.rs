@@ -86,6 +86,20 @@ fn prepared() -> Folder {
         let newtons = 20.0 * (1.0 - (TAU * f64::from(k) / 1000.0).cos());
         [f64::from(k) * 0.01, newtons, 5.0 + newtons / 10.0 + 1e-3 * (f64::from(k) * 1.7).sin()]
     };
+    // Three strokes of each leg alone, as `watch` writes them.
+    for leg in 0..6 {
+        let six = |name: &str, unit: &str| (0..6).map(|k| format!(",{name}[{k}]{unit}")).collect::<String>();
+        let mut text = format!("phase,time_s{}{}\n", six("volts", "_mean_V"), six("leg", "_m"));
+        for row in 0..75 {
+            let time = f64::from(row) * 0.02;
+            let volts = 10.0 * (1.0 - (TAU * 2.0 * time).cos());
+            let of =
+                |own: f64, other: f64| (0..6).map(|k| format!(",{}", if k == leg { own } else { other })).collect();
+            let (drives, lengths): (String, String) = (of(volts, 0.0), of(6e-7 * volts, 2e-9 * volts));
+            writeln!(text, "6,{time}{drives}{lengths}").unwrap();
+        }
+        folder.write(&format!("leg{leg}.csv"), text);
+    }
     folder.write("candidates.json", "[{}, {\"level\": 0.2, \"drift\": 0.03}]");
     write("force.csv", "time_s,force_N,displacement_um", &mut (0..4000).map(force));
     folder

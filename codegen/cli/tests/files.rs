@@ -49,6 +49,7 @@ const LINES: &[(&str, &[(&str, &str)])] = &[
     ("specgen identify linear", &[("records", "sine.csv")]),
     ("specgen identify response", &[("record", "r.csv")]),
     ("specgen identify gains", &[("recording", "run.rec"), ("spec", "legs.toml")]),
+    ("specgen identify cross-talk", &[("records", "r.csv")]),
     ("specgen identify gauge", &[("record", "r.csv")]),
     ("specgen identify predict", &[("model", "table.csv"), ("drive", "r.csv")]),
     ("specgen identify stiffness", &[("record", "r.csv")]),

@@ -128,7 +128,7 @@ fn keys_units_choices_and_files_are_offered_and_explained() {
     assert_eq!(labels(3), ["invhys", "ewma", "pcc"]);
     assert!(labels(4).contains(&"records/reference-forc.csv".to_owned()), "{:?}", labels(4));
     // Existing keys are not offered again.
-    assert_eq!(labels(5), ["resonance_gain", "capacitance"]);
+    assert_eq!(labels(5), ["resonance_gain", "cross_talk", "capacitance"]);
 }
 
 /// Neovim opens a spec with an error, shows the hover text and applies the fix.

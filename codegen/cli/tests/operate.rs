@@ -86,6 +86,44 @@ fn serve(listener: &UnixListener, phase: &AtomicU32, fails: &AtomicBool, over: &
 const WAVE: &str = "ramp = 0.05\nseconds = 0.4\n\
     [[axis]]\naxis = \"z\"\nshape = { kind = \"sine\", amplitude = 1e-6, frequency = 5.0 }\n";
 
+/// From rest, without the law: the volts of one leg, and what the gauges show of all legs, in a file that `identify` reads.
+#[test]
+fn an_open_drive_is_commanded_and_watched() {
+    let folder = Folder::new();
+    let board = SocketBoard::new(&folder);
+    let shape = "shape = { kind = \"sine\", amplitude = 2.0, frequency = 5.0 }";
+    folder.write("volts.toml", format!("drive = true\nramp = 0.05\n[[axis]]\naxis = 1\noffset = 4.0\n{shape}\n"));
+    folder.write("fast.toml", folder.read("volts.toml").replace("5.0", "4000.0"));
+    folder.write("wave.toml", WAVE);
+    let run = Run::of(&mut board.operate(&folder, &["reference.toml", "arm", "wait holding 20", "wave volts.toml"]));
+    run.says(1, &["volts.toml: a wave of voltages needs an open drive; the machine is holding"]);
+    folder.write(
+        "drive.txt",
+        "arm\nwait holding 20\ndrive\nwait driving\nwave volts.toml\nwatch 100 1 legs.csv\nwave stop\nwait 0.2\n\
+         status\nhold\nwait holding\nramp-down\nwait disarmed 20\n",
+    );
+    let run = Run::of(&mut board.operate(&folder, &["reference.toml", "--script", "drive.txt"]));
+    run.says(0, &[]);
+    assert!(run.stdout.contains("`hold` ends it"), "{run:?}");
+    let text = folder.read("legs.csv");
+    let mut lines = text.lines().map(|line| line.split(',').collect::<Vec<_>>());
+    let titles = lines.next().unwrap();
+    let at = |name: &str| titles.iter().position(|title| *title == name).unwrap();
+    let [phase, volts, leg] = ["phase", "volts[1]_mean_V", "leg[5]_m"].map(at);
+    let rows: Vec<_> = lines.collect();
+    let volts = |row: &Vec<&str>| row[volts].parse::<f64>().unwrap();
+    assert!(rows.len() > 80 && rows.iter().all(|row| row[phase] == "6" && row[leg].parse::<f64>().is_ok()), "{text}");
+    let highest = rows.iter().map(volts).fold(0.0, f64::max);
+    assert!((5.0..=6.0).contains(&highest), "{highest} V");
+    for (wave, why) in [
+        ("fast.toml", "fast.toml: leg 1 would exceed the slew rate"),
+        ("wave.toml", "wave.toml: an open drive needs `drive = true`; the machine is driving"),
+    ] {
+        let lines = ["reference.toml", "arm", "wait holding 20", "drive", "wait driving", &format!("wave {wave}")];
+        Run::of(&mut board.operate(&folder, &lines)).says(1, &[why]);
+    }
+}
+
 #[test]
 fn a_script_runs_a_wave_and_fetches_its_record() {
     let folder = Folder::new();
@@ -129,7 +167,7 @@ fn a_script_runs_a_wave_and_fetches_its_record() {
         (
             "set command=x",
             2,
-            "`command`: expected hold, stream, move, trajectory, found `x`; nothing was sent to the machine",
+            "`command`: expected hold, stream, move, trajectory, drive, found `x`; nothing was sent to the machine",
         ),
         ("wave none.toml", 1, "`none.toml` cannot be read: there is no such file"),
         ("play case-1 correction=none.json machine=m", 1, "`none.json` cannot be read: there is no such file"),
@@ -297,7 +335,7 @@ fn a_fault_ends_a_script_with_its_cause_and_lines_go_on_after_a_mistake() {
     for text in [
         "invalid command `go`",
         "expected a finite number, found `x`",
-        "expected hold, stream, move, trajectory, found `mov`",
+        "expected hold, stream, move, trajectory, drive, found `mov`",
     ] {
         assert!(printed.contains(text), "{printed}");
     }

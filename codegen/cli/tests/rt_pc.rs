@@ -351,7 +351,7 @@ fn a_host_arms_it_over_the_link_makes_a_wave_and_is_missed(bench: &Bench) {
     for request in [Request::LockstepReset { config: Bytes(&[]) }, Request::LockstepStage { index: 0 }] {
         assert_eq!(host.refused(&request), Refusal::Unsupported);
     }
-    assert_eq!(host.refused(&Request::Supervise { request: 6 }), Refusal::Word { index: 0 });
+    assert_eq!(host.refused(&Request::Supervise { request: 7 }), Refusal::Word { index: 0 });
     let command = vec![0; 8 * machine.input_names().iter().position(|name| name == "gauge[0]").unwrap()];
     assert_eq!(host.refused(&Request::Setpoint { words: Bytes(&command[8..]) }), Refusal::Length { expected: 21 });
 

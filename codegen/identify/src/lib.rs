@@ -27,6 +27,7 @@ mod cause;
 mod columns;
 mod container;
 mod coverage;
+pub mod cross_talk;
 mod dead_time;
 pub mod declared;
 mod defects;

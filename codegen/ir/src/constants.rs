@@ -119,6 +119,11 @@ pub fn affine<T: Real>(numbers: &impl Numbers<T>, load: &ir::Load) -> Option<Aff
         .map(|affine| Affine { pose: numbers.matrix(&affine.pose), acceleration: numbers.matrix(&affine.acceleration) })
 }
 
+/// Cross-talk of the legs beside the full kernel, if there is any.
+pub fn cross_talk<T: Real>(numbers: &impl Numbers<T>, load: &ir::Load) -> Option<[[T; 6]; ir::LEGS]> {
+    load.cross_talk.as_ref().map(|rows| numbers.matrix(rows))
+}
+
 /// The modal notch, if there is one.
 pub fn notch<T: Real>(numbers: &impl Numbers<T>, law: &ir::ControlLaw) -> Option<Notch<T>> {
     law.notch.as_ref().map(|notch| Notch {

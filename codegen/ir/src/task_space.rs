@@ -23,8 +23,10 @@ pub struct TaskSpace {
 /// The load p of the legs under motion and gravity, (7), without feed-forward of an interaction force.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Load {
-    /// First-order model; none to use the full kernel.
+    /// First-order model, with the cross-talk of the legs; none to use the full kernel.
     pub affine: Option<Affine>,
+    /// E J: cross-talk of the legs beside the full kernel, a row by leg, m/m and m/rad.
+    pub cross_talk: Option<[[f64; 6]; LEGS]>,
     /// Largest permitted error within the limits of moves and trajectories, m of a leg.
     pub tolerance: f64,
     /// Proven bounds of the first-order model: for moves and trajectories; for stops from any declared speed; for any stream.

@@ -21,7 +21,7 @@ const WATCHED: f64 = 10.0;
 const AFTER: u32 = 1000;
 /// Commands that an edge of the input line can start.
 const EDGE_STARTS: &str = "move, jog, goto, play without a correction, or wave FILE";
-const COMMANDS: &str = "status, arm, run, hold, ramp-down, acknowledge, none, set NAME=VALUE…, \
+const COMMANDS: &str = "status, arm, run, hold, drive, ramp-down, acknowledge, none, set NAME=VALUE…, \
                         move|jog AXIS=QUANTITY…, where, limits, can-i-go AXIS=QUANTITY… [speed=QUANTITY], frame [none | work|tool AXIS=QUANTITY…], mark NAME, goto NAME, \
                         play TRAJECTORY [correction=FILE machine=NAME], mode p|f|pf, gains [NAME=VALUE…], trigger LINE NAME=VALUE…, \
                         wait PHASE|arrived|SECONDS [TIMEOUT], config [code_min=CODE] [code_max=CODE], config write SPEC, \
@@ -175,7 +175,7 @@ impl Command {
     pub fn moves(&self) -> bool {
         matches!(
             self,
-            Self::Ask(Request::Arm | Request::Run)
+            Self::Ask(Request::Arm | Request::Run | Request::Drive)
                 | Self::Set(_)
                 | Self::Move { .. }
                 | Self::Goto(_)
@@ -209,6 +209,7 @@ impl Command {
             ["arm"] => Self::Ask(Request::Arm),
             ["run"] => Self::Ask(Request::Run),
             ["hold"] => Self::Ask(Request::Hold),
+            ["drive"] => Self::Ask(Request::Drive),
             ["ramp-down"] => Self::Ask(Request::RampDown),
             ["acknowledge"] => Self::Ask(Request::Acknowledge),
             ["set", ref rest @ ..] if !rest.is_empty() => {

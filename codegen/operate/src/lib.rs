@@ -30,4 +30,4 @@ pub use command::{Command, FrameRequest, ModeRequest, WaitCondition};
 pub use line::Line;
 pub use session::{GAUGES, MAX_AGE, MeasuredPose, POLL_INTERVAL, Session};
 pub use socket::SocketLine;
-pub use wave::{read_wave, refused_wave};
+pub use wave::{WaveWords, read_wave, refused_wave};

@@ -144,7 +144,8 @@ impl Motion {
     }
 
     /// Displacement of each leg from rest at a pose of the platform, m.
-    fn displacements(&self, pose: &[f64; 6]) -> [f64; 6] {
+    #[must_use]
+    pub fn displacements(&self, pose: &[f64; 6]) -> [f64; 6] {
         let [x, y, z, tilt_x, tilt_y, tilt_z] = *pose;
         let turn = rotation([tilt_x, tilt_y, tilt_z]);
         self.legs.map(|Leg { rest, joint }| {

@@ -446,7 +446,7 @@ impl Panel {
                     message.advice,
                     message.code.as_deref(),
                 );
-                if u64::from(status.phase) != Phase::Running.word() {
+                if !Phase::from_word(u64::from(status.phase)).is_some_and(Phase::is_commanded) {
                     self.wave = Value::Null;
                 }
             }

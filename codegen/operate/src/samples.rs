@@ -10,6 +10,7 @@
 use serde::Serialize;
 use specgen_link::client::{ClientError, Port};
 use specgen_link::{Reply, Request, samples};
+use specgen_runtime::supervisor::Phase;
 
 use crate::Session;
 use crate::motion::Motion;
@@ -36,6 +37,10 @@ pub struct Row {
     pub error: Option<[Spread; 6]>,
     /// Voltage of each leg over all ticks, V.
     pub volts: [Spread; 6],
+    /// Displacement of each leg from rest, m, at the mean of the poses measured; none without a pose, or while the law runs: its
+    /// set-point moves within a row.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub legs: Option<[f64; 6]>,
 }
 
 /// Consecutive rows.
@@ -103,6 +108,10 @@ impl Row {
             motion.and_then(|motion| motion.user(&pose)).unwrap_or(pose)
         };
         let is_measured = status & GAUGES == 0;
+        let mean: [f64; 6] = std::array::from_fn(|axis| f64::from(target[axis]) - f64::from(error[axis].mean));
+        let legs = motion
+            .filter(|_| is_measured && u64::from(phase) != Phase::Running.word())
+            .map(|motion| motion.displacements(&mean));
         Self {
             status,
             phase,
@@ -110,6 +119,7 @@ impl Row {
             target: user(target),
             error: is_measured.then_some(error),
             volts,
+            legs,
         }
     }
 }

@@ -14,6 +14,7 @@ use specgen_runtime::supervisor;
 
 use crate::motion::Motion;
 use crate::pil::{self, OpenError, OpenSession};
+use crate::wave::WaveWords;
 
 /// Interval of requests to a device. It treats the link as lost after five times this interval.
 pub const POLL_INTERVAL: Duration = Duration::from_millis(20);
@@ -27,7 +28,7 @@ pub const MAX_AGE: Duration = Duration::from_millis(300);
 pub const GAUGES: u32 = 0x3f00;
 
 /// Names of the values of a platform's word `command`.
-const COMMANDS: [&str; 4] = ["hold", "stream", "move", "trajectory"];
+const COMMANDS: [&str; 5] = ["hold", "stream", "move", "trajectory", "drive"];
 
 /// Number of words of a pose.
 const POSE: usize = 6;
@@ -187,9 +188,10 @@ impl<P: Port> Session<P> {
         Ok(Some(MeasuredPose { tick, phase, status, pose, measured, target, voltage: six(3 * POSE) }))
     }
 
-    /// Resets the command words unless the machine is running: in any other phase it has discarded its command.
+    /// Resets the command words unless the machine follows commands: in any other phase it has discarded its command.
     fn forget(&mut self, phase: u8) {
-        if u64::from(phase) != supervisor::Phase::Running.word() {
+        let phase = supervisor::Phase::from_word(u64::from(phase));
+        if !phase.is_some_and(supervisor::Phase::is_commanded) {
             self.command.fill(0);
         }
     }
@@ -356,12 +358,12 @@ impl<P: Port> Session<P> {
     }
 
     /// Starts a wave, at once or at the next rising edge of the input line. Its center, where it ends, becomes the set-point.
-    pub fn start_wave(&mut self, words: &[u64], center: &[u64; 6], on_edge: bool) -> Result<(), ClientError> {
-        let bytes: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).collect();
+    pub fn start_wave(&mut self, wave: &WaveWords, on_edge: bool) -> Result<(), ClientError> {
+        let bytes: Vec<u8> = wave.words.iter().flat_map(|word| word.to_le_bytes()).collect();
         let action = if on_edge { WaveAction::StartOnEdge } else { WaveAction::Start };
         self.done(&Request::Wave { action, words: specgen_link::Bytes(&bytes) })?;
         let first = self.free_names().iter().position(|name| name == "setpoint[0]").unwrap_or_default();
-        for (slot, word) in self.command.iter_mut().skip(first).zip(center) {
+        for (slot, word) in self.command.iter_mut().skip(first).zip(&wave.center) {
             *slot = *word;
         }
         Ok(())

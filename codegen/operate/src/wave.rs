@@ -1,6 +1,7 @@
 //! Reads a wave from a TOML file into the words of a device's generator.
 //!
 //! ```toml
+//! drive   = false                              # true: of the voltages of an open drive, V in place of m and rad
 //! center  = [0.0, 0.0, 1e-6, 0.0, 0.0, 0.0]   # start and end, m and rad (legs: m); zeros if not given
 //! ramp    = 0.5                                # smooth start and end, s
 //! seconds = 10.0                               # duration; until `wave stop` if not given
@@ -13,7 +14,7 @@
 
 use serde::Deserialize;
 use specgen_runtime::Real;
-use specgen_runtime::wave::{AxisWave, Refusal, Settings, Shape, TONES, Tone, WORDS, step_of};
+use specgen_runtime::wave::{AxisWave, LARGEST, Refusal, Settings, Shape, TONES, Tone, WORDS, step_of};
 
 use crate::place::AXES;
 
@@ -23,6 +24,8 @@ const MOST_TICKS: f64 = (1_u64 << 30) as f64;
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct File {
+    #[serde(default)]
+    drive: bool,
     #[serde(default)]
     center: [f64; 6],
     ramp: f64,
@@ -89,17 +92,29 @@ struct ToneEntry {
     phase: f64,
 }
 
-/// Words of a wave from the text of its file, and those of its center, for a controller with this period (s) and scalar.
+/// A wave for a device.
+#[derive(Debug)]
+pub struct WaveWords {
+    /// For the device's generator.
+    pub words: Vec<u64>,
+    /// Words of its center.
+    pub center: [u64; 6],
+    /// Whether it is of the voltages of an open drive.
+    pub drives: bool,
+}
+
+/// Words of a wave from the text of its file, for a controller with this period (s) and scalar.
 ///
 /// # Errors
 /// The wave is invalid; syntax errors have line and column.
-pub fn read_wave(text: &str, period: f64, single: bool) -> Result<(Vec<u64>, [u64; 6]), String> {
+pub fn read_wave(text: &str, period: f64, single: bool) -> Result<WaveWords, String> {
     let file: File = toml::from_str(text).map_err(|error| error.to_string())?;
     if single { words::<f32>(&file, period) } else { words::<f64>(&file, period) }
 }
 
-fn words<T: Real>(file: &File, period: f64) -> Result<(Vec<u64>, [u64; 6]), String> {
-    let reader = Reading { period };
+fn words<T: Real>(file: &File, period: f64) -> Result<WaveWords, String> {
+    let drives = file.drive;
+    let reader = Reading { period, unit: if drives { "V" } else { "m or rad" } };
     let mut settings = Settings::<T>::still();
     let mut tones = 0;
     for (slot, value) in settings.center.iter_mut().zip(file.center) {
@@ -110,6 +125,7 @@ fn words<T: Real>(file: &File, period: f64) -> Result<(Vec<u64>, [u64; 6]), Stri
     let mut seen = [false; 6];
     for axis in &file.axis {
         let place = match &axis.axis {
+            Name::Pose(_) if drives => return Err("axis: an open drive has legs 0 to 5".to_owned()),
             Name::Pose(name) => AXES.iter().position(|known| known == name),
             Name::Leg(leg) => Some(*leg).filter(|leg| *leg < 6),
         };
@@ -124,7 +140,7 @@ fn words<T: Real>(file: &File, period: f64) -> Result<(Vec<u64>, [u64; 6]), Stri
     let words = settings.to_words();
     // Errors that every device would refuse.
     match Settings::<T>::from_words(&words) {
-        Ok(_) => Ok((words.to_vec(), settings.center.map(Real::to_word))),
+        Ok(_) => Ok(WaveWords { words: words.to_vec(), center: settings.center.map(Real::to_word), drives }),
         Err(refused) => Err(match refused {
             Refusal::Word(word) => format!(
                 "{} is invalid: amplitudes must not be negative (except of ramp and reversals), chirps must stay between 0 Hz and \
@@ -145,32 +161,40 @@ fn place_of(word: usize) -> String {
     }
 }
 
-/// Why a device refused a wave, from the word in its refusal.
+/// Why a device refused a wave, from the word in its refusal. `drives`: it is one of an open drive.
 #[must_use]
-pub fn refused_wave(word: u16) -> String {
-    let name = |axis: usize| AXES.get(axis).map_or_else(|| axis.to_string(), |name| format!("{name} (leg {axis})"));
-    let too_fast = |axis, what| {
-        let axis = name(axis);
-        format!("axis {axis} would exceed the {what} of a stream: reduce amplitude or frequency, or use a longer ramp")
+pub fn refused_wave(word: u16, drives: bool) -> String {
+    let name = |axis: usize| match AXES.get(axis) {
+        Some(_) if drives => format!("leg {axis}"),
+        Some(name) => format!("axis {name} (leg {axis})"),
+        None => format!("axis {axis}"),
     };
+    let [range, rate, acceleration] = if drives {
+        ["leave the voltage limits", "exceed the slew rate", "reverse too fast"]
+    } else {
+        ["leave its range", "exceed the speed of a stream", "exceed the acceleration of a stream"]
+    };
+    let slower = "reduce amplitude or frequency, or use a longer ramp";
     match Refusal::of_word(usize::from(word)) {
-        Refusal::Range(axis) => format!("axis {} would leave its range: reduce amplitude or offset", name(axis)),
-        Refusal::Rate(axis) => too_fast(axis, "speed"),
-        Refusal::Acceleration(axis) => too_fast(axis, "acceleration"),
+        Refusal::Range(axis) => format!("{} would {range}: reduce amplitude or offset", name(axis)),
+        Refusal::Rate(axis) => format!("{} would {rate}: {slower}", name(axis)),
+        Refusal::Acceleration(axis) => format!("{} would {acceleration}: {slower}", name(axis)),
         Refusal::Word(_) | Refusal::Busy => format!("{} is invalid", place_of(usize::from(word))),
     }
 }
 
 struct Reading {
     period: f64,
+    /// Of places and amplitudes.
+    unit: &'static str,
 }
 
 impl Reading {
     fn number<T: Real>(&self, what: &str, value: f64) -> Result<T, String> {
-        if value.abs() <= specgen_runtime::snapshot::LARGEST_PLACE {
+        if value.abs() <= LARGEST {
             Ok(T::from_f64(value))
         } else {
-            Err(format!("{what}: expected m or rad, found {value}"))
+            Err(format!("{what}: expected {}, found {value}", self.unit))
         }
     }
 
@@ -259,7 +283,8 @@ mod tests {
 
     #[test]
     fn a_file_becomes_the_words_of_its_wave_in_both_scalars() {
-        let (words, center) = read_wave(GOOD, 1e-4, false).unwrap();
+        let WaveWords { words, center, drives } = read_wave(GOOD, 1e-4, false).unwrap();
+        assert!(!drives);
         let wave = Settings::<f64>::from_words(words.as_slice().try_into().unwrap()).unwrap();
         assert_eq!((wave.ramp_ticks, wave.ticks), (1000, 20_000));
         assert_eq!(center[2], 1e-6_f64.to_bits());
@@ -268,9 +293,22 @@ mod tests {
         assert_eq!((wave.axes[4].offset, wave.axes[4].shape), (1e-6, Shape::Multisine { first: 0, count: 2 }));
         assert_eq!(wave.tones[1].amplitude, 2e-6);
         assert_eq!(wave.axes[5].shape, Shape::Constant);
-        let (words, _) = read_wave(GOOD, 1e-4, true).unwrap();
+        let WaveWords { words, .. } = read_wave(GOOD, 1e-4, true).unwrap();
         let single = Settings::<f32>::from_words(words.as_slice().try_into().unwrap()).unwrap();
         assert_eq!(single.center[2], 1e-6);
+    }
+
+    #[test]
+    fn a_wave_of_an_open_drive_is_of_the_voltages_of_legs() {
+        let text = "drive = true\nramp = 0.1\n[[axis]]\naxis = 4\noffset = 50.0\n\
+            shape = { kind = \"sine\", amplitude = 40.0, frequency = 5.0 }\n";
+        let wave = read_wave(text, 1e-4, false).unwrap();
+        let settings = Settings::<f64>::from_words(wave.words.as_slice().try_into().unwrap()).unwrap();
+        assert!(wave.drives);
+        assert_eq!(settings.axes[4].offset, 50.0);
+        let error = |from: &str, to: &str| read_wave(&text.replace(from, to), 1e-4, false).unwrap_err();
+        assert!(error("axis = 4", "axis = \"z\"").contains("legs 0 to 5"));
+        assert!(error("50.0", "5e4").contains("expected V, found 50000"));
     }
 
     #[test]
@@ -289,6 +327,7 @@ mod tests {
             let error = read_wave(&GOOD.replace(from, to), 1e-4, false).unwrap_err();
             assert!(error.contains(expected), "{to}: {error}");
         }
-        assert!(refused_wave(6 + 2 * 7 + 1).contains("axis z (leg 2) would leave its range"));
+        assert!(refused_wave(6 + 2 * 7 + 1, false).contains("axis z (leg 2) would leave its range"));
+        assert!(refused_wave(6 + 2 * 7 + 2, true).starts_with("leg 2 would exceed the slew rate: reduce"));
     }
 }

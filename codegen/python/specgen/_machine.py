@@ -88,6 +88,10 @@ class Machine:
         """Holds the set-point."""
         self.execute("hold")
 
+    def drive(self) -> None:
+        """Begins an open drive from a hold: the law is suspended, and a wave or `set` commands the voltages of the legs."""
+        self.execute("drive")
+
     def ramp_down(self) -> None:
         """Ramps the voltages down to rest, and switches the amplifiers off."""
         self.execute("ramp-down")

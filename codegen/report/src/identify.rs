@@ -1,6 +1,7 @@
 //! Identification commands: measured records in; tables, spec lines, figures and pictures out.
 
 mod cause;
+pub mod cross_talk;
 pub mod estimates;
 pub mod everett;
 pub mod gains;

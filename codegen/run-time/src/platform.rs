@@ -31,6 +31,7 @@ law_constants! {
     lend modes_to_legs: [[T; 6]; LEGS] = convert.matrix(&law.modes_to_legs);
     lend body: specgen_runtime::Platform<T> = body(convert, ir)?;
     maybe affine_load: Option<Affine<T>> as Option<&Affine<T>> = constants::affine(convert, &task.load);
+    maybe cross_talk: Option<[[T; 6]; LEGS]> as Option<&[[T; 6]; LEGS]> = constants::cross_talk(convert, &task.load);
     lend rest_force: [T; LEGS] = convert.vector(&law.rest_force);
     lend wrench_limit: [T; 6] = convert.vector(&law.wrench_limit);
     copy lead: T = convert.real(law.lead);

@@ -21,13 +21,14 @@ use specgen_language::output::{claim, write_folder};
 use specgen_language::ui::{ControllerForm, Ui};
 
 /// Requests to the supervisor, by name.
-const REQUESTS: [(&str, u32); 6] = [
+const REQUESTS: [(&str, u32); 7] = [
     ("NONE", Request::None as u32),
     ("ARM", Request::Arm as u32),
     ("RUN", Request::Run as u32),
     ("HOLD", Request::Hold as u32),
     ("RAMP_DOWN", Request::RampDown as u32),
     ("ACKNOWLEDGE", Request::Acknowledge as u32),
+    ("DRIVE", Request::Drive as u32),
 ];
 /// Event bits of the supervisor.
 const EVENTS: [(&str, u32); 7] = [

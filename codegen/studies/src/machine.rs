@@ -142,7 +142,11 @@ pub fn scenario(model: &Model, task: &TaskSpace, specimen: &Specimen, noise: &No
         let rig: PlatformRig = scenario.rig().clone().with_signal(GaugeSignal::Volts(calibration.clone()));
         *scenario.rig_mut() = rig;
     }
-    scenario.rig_mut().plant_mut().step_whole_ticks(model.timing.period);
+    let plant = scenario.rig_mut().plant_mut();
+    plant.step_whole_ticks(model.timing.period);
+    if let Some(cross_talk) = &model.actuator.cross_talk {
+        plant.couple(cross_talk);
+    }
     scenario
 }
 

@@ -62,8 +62,8 @@ pub struct Exchange {
     pub(crate) samples: Option<Samples>,
     /// Lock-step: the host steps the machine, and the ticks do not. Time since its last request.
     pub lockstep: Option<Silence>,
-    /// Whether the machine ran in the last tick.
-    ran: bool,
+    /// Phase of the last tick.
+    phase: Phase,
 }
 
 impl Default for Exchange {
@@ -94,7 +94,7 @@ impl Exchange {
             away: None,
             samples: None,
             lockstep: None,
-            ran: false,
+            phase: Phase::Disarmed,
         }
     }
 
@@ -174,9 +174,9 @@ impl Exchange {
         if passes::POSSIBLE {
             self.source.advance_pass(phase, command);
         }
-        let runs = phase == Phase::Running;
-        if core::mem::replace(&mut self.ran, runs) && !runs {
-            // An old command must not take effect when the machine runs again.
+        let before = core::mem::replace(&mut self.phase, phase);
+        if before.is_commanded() && phase != before {
+            // An old command must not take effect when the machine runs or is driven again.
             waves::rest(&[0.0; 6], command);
         }
     }

@@ -187,7 +187,7 @@ impl Backend for RequestContext<'_, '_> {
     fn command(&mut self, command: &Command) -> Result<(), Refusal> {
         self.change_command(|exchange| {
             // A command from before the run must not take effect later.
-            let free = !exchange.source.is_engaged() && exchange.report.phase == Phase::Running;
+            let free = !exchange.source.is_engaged() && exchange.report.phase.is_commanded();
             if free {
                 exchange.source.cancel_awaited();
                 exchange.command.command = *command;
@@ -249,26 +249,35 @@ impl Backend for RequestContext<'_, '_> {
         Ok(Reply::Chunk { offset, total, bytes: Bytes(bytes) })
     }
 
-    /// Checks a wave while ticks go on, then passes it to them, if the machine runs and no wave is under way.
+    /// Checks a wave while ticks go on, then passes it to them, if the machine follows commands and no wave is under way.
     #[inline(never)]
     fn start_wave(&mut self, settings: &Settings<Real>, on_edge: bool) -> Result<(), Refusal> {
-        let limits = self.locked(None, |exchange, _| Some(waves::limits(exchange.settings()))).ok_or(Refusal::State)?;
-        let mut wave = Wave::new(limits);
+        let (drives, limits) = self
+            .locked(None, |exchange, _| {
+                let drives = exchange.report.phase == Phase::Driving;
+                let limits = if drives { waves::drive_limits } else { waves::limits };
+                Some((drives, limits(exchange.settings())))
+            })
+            .ok_or(Refusal::State)?;
+        let mut wave = Wave::new(limits).of_drive(drives);
         wave.set(settings).map_err(wave_refusal)?;
         if on_edge {
             return self.wait_for_edge(EdgeCommand::Wave, Some(wave));
         }
         wave.start();
-        self.change_command(|exchange| {
+        self.locked(Err(Refusal::State), |exchange, machine| {
             let (status, command) = (exchange.report.status, &exchange.command.command);
-            let may = exchange.report.phase == Phase::Running
-                && !exchange.source.is_engaged()
-                && waves::may_begin(status, command, &settings.center, &limits).is_ok();
-            if may {
-                exchange.source.cancel_awaited();
-                exchange.source.wave = Some(wave);
+            let is_there = match exchange.report.phase {
+                Phase::Running if !drives => waves::may_begin(status, command, &settings.center, &limits).is_ok(),
+                Phase::Driving if drives => waves::may_drive(&place_words(&machine.state), &settings.center, &limits),
+                _ => false,
+            };
+            if !is_there || exchange.in_lockstep() || exchange.source.is_engaged() {
+                return Err(Refusal::State);
             }
-            may
+            exchange.source.cancel_awaited();
+            exchange.source.wave = Some(wave);
+            Ok(())
         })
     }
 

@@ -109,14 +109,15 @@ impl<P: BorrowMut<Player<'static, Real>>> Source<P> {
         self.pending.settle(tick, begun);
     }
 
-    /// Writes the set-point of a wave into the command; true if there is one. Only a running machine follows one: to
-    /// continue later would be a jump. Not inlined, so that its stack frame is released before the law needs the stack.
+    /// Writes the set-point of a wave into the command; true if there is one. Only a machine that runs has one,
+    /// or one that drives if it is of voltages: to continue later would be a jump. Not inlined, so that its stack frame is released before the law needs the stack.
     #[inline(never)]
     pub fn advance_wave(&mut self, phase: Phase, command: &mut Command) -> bool {
         let Some(wave) = self.wave.as_mut().filter(|wave| wave.stage() != Stage::Idle) else { return false };
-        let motion = if phase == Phase::Running { wave.advance() } else { None };
+        let phase_of_wave = if wave.drives() { Phase::Driving } else { Phase::Running };
+        let motion = if phase == phase_of_wave { wave.advance() } else { None };
         match motion {
-            Some(motion) => waves::write(&motion, wave.sequence(), command),
+            Some(motion) => waves::write(&motion, wave.sequence(), wave.drives(), command),
             None => self.wave = None,
         }
         motion.is_some()

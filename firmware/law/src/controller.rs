@@ -51,6 +51,7 @@ macro_rules! controller {
                 body -> &$crate::specgen_runtime::Platform<Real> = &body::PLATFORM;
                 affine_load -> Option<&$crate::specgen_runtime::Affine<Real>> =
                     const { task_space::AFFINE_LOAD.as_ref() };
+                cross_talk -> Option<&[[Real; 6]; LEGS]> = const { task_space::CROSS_TALK.as_ref() };
                 rest_force -> &[Real; LEGS] = &task_space::REST_FORCE;
                 wrench_limit -> &[Real; 6] = &task_space::WRENCH_LIMIT;
                 lead -> Real = task_space::LEAD;
@@ -212,7 +213,8 @@ macro_rules! controller {
             pub const MACHINE_INPUT_WORDS: usize = INPUT_WORDS + 2;
             /// Words of a supervised tick's output.
             pub const MACHINE_OUTPUT_WORDS: usize = OUTPUT_WORDS + 2;
-            /// Names of the input words. `request` is 0 none, 1 arm, 2 run, 3 hold, 4 ramp down, 5 acknowledge.
+            /// Names of the input words. `request` is 0 none, 1 arm, 2 run, 3 hold, 4 ramp down, 5 acknowledge, 6 open
+            /// drive.
             /// `events` is a set of bits.
             pub const MACHINE_INPUT_NAMES: [&str; MACHINE_INPUT_WORDS] =
                 $crate::followed_by(&INPUT_NAMES, ["request", "events"]);
@@ -220,7 +222,7 @@ macro_rules! controller {
             /// wiring check or fallback stage of the law << 17. `conditions` has bit 1 << cause for each cause that is
             /// present, debounced or not; from bit 16 on the gauges or legs concerned; from bit 22 on the gauges whose
             /// words were replaced by predictions. Bit 28 is cause 16, bits 29 and 30 are the fallback stage, bit 31 is
-            /// cause 17, see [`Fallback`].
+            /// cause 17, bit 0 is cause 18, see [`Fallback`].
             pub const MACHINE_OUTPUT_NAMES: [&str; MACHINE_OUTPUT_WORDS] =
                 $crate::followed_by(&OUTPUT_NAMES, ["supervisor", "conditions"]);
 
@@ -360,7 +362,7 @@ macro_rules! controller {
 
         /// A wave in place of the host's set-points.
         pub mod waves {
-            pub use $crate::$law::waves::{limits, may_begin, rest, write};
+            pub use $crate::$law::waves::{drive_limits, limits, may_begin, may_drive, rest, write};
 
             /// The wave generator of this controller.
             pub type Wave = $crate::specgen_runtime::wave::Wave<super::Real>;

@@ -177,7 +177,30 @@ pub trait ControlLaw<P: Spec<Law = Self>>: Sized {
     fn decelerate(_p: P, _config: &Config<P>, _machine: &mut Machine<P>, _input: &Self::Input) -> Option<u32> {
         None
     }
-    /// Measures while codes are held or ramp to rest and the law is suspended. Returns the invalid gauges, bit by bit.
+    /// Voltages that the input commands in an open drive, V.
+    ///
+    /// # Errors
+    /// There are none, or one is not finite: the status of a tick in which the legs are held.
+    #[inline]
+    fn voltages(_input: &Self::Input) -> Result<&[P::Real; LEGS], u32> {
+        Err(0)
+    }
+    /// Whether an open drive may begin: no motion is under way, and the pose is not near the end of the workspace.
+    #[inline]
+    fn may_drive(_p: P, _state: &Self::State) -> bool {
+        true
+    }
+    /// Measured pose, m and rad.
+    #[inline]
+    fn pose(_state: &Self::State) -> [P::Real; 6] {
+        [P::Real::ZERO; 6]
+    }
+    /// Whether the platform may leave its workspace before an open drive ends. `before`: the pose a tick ago.
+    #[inline]
+    fn is_near_end(_p: P, _state: &Self::State, _before: &[P::Real; 6]) -> bool {
+        false
+    }
+    /// Measures while codes are held, driven or ramp to rest and the law is suspended. Returns the invalid gauges, bit by bit.
     fn hold(p: P, config: &Config<P>, machine: &mut Machine<P>, input: &Self::Input) -> u32;
     /// Output lines over the next interval, as bits of the status. They are low unless the law runs.
     #[inline]

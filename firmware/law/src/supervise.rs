@@ -1,8 +1,9 @@
 //! A tick of the control law: alone, and under its supervisor, as every target calls it.
 
+use specgen_runtime::CodeLimits;
 use specgen_runtime::linear::{component, each};
 use specgen_runtime::sensing::faults;
-use specgen_runtime::supervisor::{Fallback, Phase, Sample, Supervisor, toward};
+use specgen_runtime::supervisor::{Fallback, Phase, Request, Sample, Supervisor, toward};
 
 use crate::machine::{MachineInput, MachineOutput};
 use crate::memory::LegMemory as _;
@@ -44,7 +45,11 @@ pub fn supervise<P: Spec>(
     let Machine { state, supervisor } = machine;
     let at_rest =
         supervisor.phase != Phase::Running && P::Law::codes(state).iter().all(|code| *code == p.supervision().rest);
-    let enters = supervisor.decide(p.supervision(), input.request, input.events, at_rest);
+    let request = match input.request {
+        Request::Drive if supervisor.phase == Phase::Holding && !P::Law::may_drive(p, state) => Request::Hold,
+        request => request,
+    };
+    let enters = supervisor.decide(p.supervision(), request, input.events, at_rest);
     if enters {
         P::Law::enter_running(p, config, machine, &input.tick);
     }
@@ -108,7 +113,7 @@ fn run<P: Spec>(
     status
 }
 
-/// Codes held or ramping to rest, the law suspended. Returns the status.
+/// Codes held, driven or ramping to rest, the law suspended. Returns the status.
 #[cold]
 #[inline(never)]
 fn hold<P: Spec>(
@@ -119,30 +124,60 @@ fn hold<P: Spec>(
     channel: usize,
     expected: P::Real,
 ) -> u32 {
-    move_codes(p, config.code_limits().max_step, machine);
+    let limits = config.code_limits();
+    let (before, pose) = (P::Law::codes(&machine.state), P::Law::pose(&machine.state));
+    let drives = machine.supervisor.phase == Phase::Driving;
+    let limited = move_codes(p, limits, machine, drives.then(|| P::Law::voltages(input)));
     let faults = P::Law::hold(p, config, machine, input);
-    let supervisor = &mut machine.supervisor;
+    let Machine { state, supervisor } = machine;
     if faults == 0 {
         // Gauges are compared with the model only while the codes are constant.
         let compares = matches!(supervisor.phase, Phase::Arming | Phase::Holding);
         if compares && !supervisor.is_checking(p.supervision()) {
             supervisor.look(p.supervision(), channel, &sample(p, input, channel, expected));
         }
+        if drives {
+            // The model of a leg that was not identified may be wrong, but a gauge must not be stuck.
+            let Sample { word, .. } = sample(p, input, channel, expected);
+            let sample = Sample { word, reading: expected, expected, error: None };
+            supervisor.look(p.supervision(), channel, &sample);
+        }
         let readings = P::Law::readings(p, input.gauges());
-        supervisor.check(p.supervision(), p.readings_per_leg(), &readings, config.code_limits());
+        supervisor.check(p.supervision(), p.readings_per_leg(), &readings, limits);
     }
-    supervisor.see(faults, 0, input.gauges(), &[0; LEGS], 1);
-    faults << 8
+    let moved = moved(&before, P::Law::codes(state));
+    supervisor.see(faults, limited & LEG_LIMITED, input.gauges(), &moved, limits.max_step);
+    if drives && P::Law::is_near_end(p, state, &pose) {
+        supervisor.see_end_of_workspace();
+    }
+    limited | faults << 8
 }
 
-/// Codes held, ramping to rest, or in the pulse of the wiring check. The memories follow the codes.
-fn move_codes<P: Spec>(p: P, max_step: i32, machine: &mut Machine<P>) {
+/// Codes held, ramping to rest, or in the pulse of the wiring check; in an open drive those of the `voltages` commanded,
+/// within their limits. The memories follow the codes. Returns the status: bits of the legs that a limit held back, or that
+/// of a refused command.
+fn move_codes<P: Spec>(
+    p: P,
+    limits: CodeLimits,
+    machine: &mut Machine<P>,
+    voltages: Option<Result<&[P::Real; LEGS], u32>>,
+) -> u32 {
     let Machine { state, supervisor } = machine;
-    let step = supervisor.step_to_rest(p.supervision(), max_step);
+    let step = supervisor.step_to_rest(p.supervision(), limits.max_step);
+    let mut status = 0;
     for ((index, (code, memory)), table) in P::Law::drives(state).enumerate().zip(p.tables()) {
-        *code = toward(*code, supervisor.goal(p.supervision(), index), step);
+        match voltages {
+            None => *code = toward(*code, supervisor.goal(p.supervision(), index), step),
+            Some(Ok(voltages)) => {
+                let (permitted, held_back) = p.dac().code_of_voltage(component(voltages, index), *code, limits);
+                *code = permitted;
+                status |= (held_back as u32) << index;
+            }
+            Some(Err(refusal)) => status = refusal,
+        }
         memory.apply(table, p.dac().drive(*code));
     }
+    status
 }
 
 /// Sample of a gauge, without an error of the law.

@@ -21,7 +21,7 @@ pub enum Request<'a> {
     /// The request to the supervisor from now on: the number of a `supervisor::Request`. It stays in force while the
     /// link is alive. Answered by [`Reply::Done`].
     Supervise {
-        /// 0 none, 1 arm, 2 run, 3 hold, 4 ramp down, 5 acknowledge.
+        /// 0 none, 1 arm, 2 run, 3 hold, 4 ramp down, 5 acknowledge, 6 open drive.
         request: u8,
     },
     /// The command from the next tick on: the controller's input words, without the measured ones, in their order.

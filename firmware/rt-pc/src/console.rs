@@ -124,6 +124,11 @@ impl Console {
         self.said.is_some_and(|said| said.phase == Phase::Running)
     }
 
+    /// Whether the machine follows commands, as far as is known.
+    pub fn is_commanded(&self) -> bool {
+        self.said.is_some_and(|said| said.phase.is_commanded())
+    }
+
     /// Cancels motions that have not been sent to the loop.
     pub fn stop(&mut self) {
         self.stops += 1;
@@ -154,13 +159,20 @@ impl Console {
     /// If the machine does not run, or plays something else; if a wave or a pass is under way; or the word of the axis
     /// that would exceed its limits.
     pub fn start_wave(&mut self, settings: &Settings<Real>, on_edge: bool) -> Result<(), Refusal> {
-        let limits = waves::limits(&self.config);
-        let running = self.said.filter(|said| said.phase == Phase::Running);
-        let Some(said) = running.filter(|_| !self.is_engaged()) else { return Err(Refusal::State) };
-        let mut wave = Wave::new(limits);
+        let commanded = self.said.filter(|said| said.phase.is_commanded() && !self.is_engaged());
+        let said = commanded.ok_or(Refusal::State)?;
+        let drives = said.phase == Phase::Driving;
+        let limits = if drives { waves::drive_limits } else { waves::limits }(&self.config);
+        let mut wave = Wave::new(limits).of_drive(drives);
         wave.set(settings).map_err(wave_refusal)?;
-        waves::may_begin(said.status, self.operator.command(), &settings.center, &limits)
-            .map_err(|_| Refusal::State)?;
+        let is_there = if drives {
+            !on_edge && waves::may_drive(&self.place, &settings.center, &limits)
+        } else {
+            waves::may_begin(said.status, self.operator.command(), &settings.center, &limits).is_ok()
+        };
+        if !is_there {
+            return Err(Refusal::State);
+        }
         // The command after the wave is sent first.
         self.operator.rest_at(&settings.center);
         self.take_pending();
@@ -402,6 +414,22 @@ mod tests {
         assert!(matches!(commands[1], LoopCommand::Wave(_)));
         console.stop_wave();
         assert!(matches!(console.outgoing().0.back(), Some(LoopCommand::StopWave)));
+    }
+
+    #[test]
+    fn a_wave_of_voltages_begins_where_the_legs_are() {
+        let mut wave = Settings { center: [30.0; 6], ..Settings::still() };
+        let mut console = console(Phase::Driving);
+        assert_eq!(console.start_wave(&wave, false), Err(Refusal::State), "the legs are at 0 V");
+        console.place[18..].fill((30.0 as Real).to_bits());
+        assert_eq!(console.start_wave(&wave, true), Err(Refusal::State), "at an edge");
+        wave.axes[3].offset = 400.0;
+        assert!(matches!(console.start_wave(&wave, false), Err(Refusal::Word { index: _ })));
+        wave.axes[3].offset = 0.0;
+        console.start_wave(&wave, false).unwrap();
+        assert!(matches!(console.outgoing().0.back(), Some(LoopCommand::Wave(_))));
+        let mut running = self::console(Phase::Running);
+        assert!(matches!(running.start_wave(&wave, false), Err(Refusal::Word { index: _ })), "30 V are no 30 m");
     }
 
     #[test]

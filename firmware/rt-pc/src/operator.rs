@@ -174,8 +174,9 @@ impl Arbiter {
 
     /// Continues the plan by the supervisor's report.
     pub fn update(&mut self, said: &SupervisorReport, now: u64) {
-        if std::mem::replace(&mut self.phase, said.phase) == Phase::Running && said.phase != Phase::Running {
-            // An old command must not take effect when the machine runs again.
+        let before = std::mem::replace(&mut self.phase, said.phase);
+        if before.is_commanded() && said.phase != before {
+            // An old command must not take effect when the machine runs or is driven again.
             waves::rest(&[0.0; 6], &mut self.command);
             (self.changed, self.commanded) = (true, true);
         }

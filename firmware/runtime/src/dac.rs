@@ -20,6 +20,7 @@
 //! let limits = CodeLimits { min: 0, max: 10_000, max_step: 100 };
 //! assert_eq!(dac.code(2.0004, 1990, limits), (2000, false));
 //! assert_eq!(dac.voltage(2000), 20.0);
+//! assert_eq!(dac.code_of_voltage(20.004, 1990, limits), (2000, false));
 //! // The slew limit, and the highest code.
 //! assert_eq!(dac.code(2.0, 1000, limits), (1100, true));
 //! assert_eq!(dac.code(10.5, 9990, limits), (10_000, true));
@@ -60,11 +61,15 @@ impl<T: Real> Dac<T> {
     #[inline]
     #[must_use]
     pub fn code(&self, drive: T, previous: i32, limits: CodeLimits) -> (i32, bool) {
-        let wanted = self.nearest(drive);
-        let permitted = within(wanted, limits.min, limits.max);
-        let code =
-            within(permitted, previous.saturating_sub(limits.max_step), previous.saturating_add(limits.max_step));
-        (code, code != wanted)
+        limited(self.nearest(drive), previous, limits)
+    }
+
+    /// [`Dac::code`] for a voltage (V, finite).
+    #[inline]
+    #[must_use]
+    pub fn code_of_voltage(&self, voltage: T, previous: i32, limits: CodeLimits) -> (i32, bool) {
+        let wanted = ((voltage - self.volts_at_zero) / self.volts_per_code + T::HALF).truncate();
+        limited(wanted, previous, limits)
     }
 
     /// The code nearest to `drive` (cells), as [`Dac::code`] if no limit holds it back.
@@ -103,6 +108,14 @@ impl<T: Real> Dac<T> {
 #[inline(always)]
 fn from<T: Real>(start: T, way: T) -> T {
     if start == T::ZERO { way } else { start + way }
+}
+
+/// The permitted code nearest to `wanted`, and whether a limit held it back.
+#[inline]
+fn limited(wanted: i32, previous: i32, limits: CodeLimits) -> (i32, bool) {
+    let permitted = within(wanted, limits.min, limits.max);
+    let code = within(permitted, previous.saturating_sub(limits.max_step), previous.saturating_add(limits.max_step));
+    (code, code != wanted)
 }
 
 #[inline]

@@ -40,8 +40,10 @@ choice! {
         Move = 2,
         /// Play the trajectory [`Command::selector`].
         Trajectory = 3,
+        /// The numbers of the set-point are the voltages of the legs, V: in an open drive only.
+        Drive = 4,
         /// Any other value: refused, and the platform holds.
-        Unknown = 4,
+        Unknown = 5,
     }
 }
 

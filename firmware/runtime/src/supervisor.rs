@@ -9,6 +9,9 @@
 //!     │ acknowledge               │ for a cause
 //!     └───────── faulted ◄────────┘            a cause that takes the amplifiers off at once: from any phase to faulted
 //! ```
+//! From *holding* the request *drive* leads to *driving*, the open drive: the host commands voltages, and the law is
+//! suspended. It ends in *holding* or *ramping down*.
+//!
 //! The law runs in *running*, and until a stop of the platform completes. Otherwise codes are constant or ramp to
 //! rest by whole codes, never faster than the slew limit: no reading and no request can cause a jump. While arming,
 //! each leg makes one small pulse.

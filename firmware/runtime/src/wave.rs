@@ -1,5 +1,5 @@
-//! The wave generator: set-points from the controller's own tick, in fixed memory, for identification, tests and
-//! records.
+//! The wave generator: set-points, or voltages of an open drive, from the controller's own tick, in fixed memory, for
+//! identification, tests and records.
 //!
 //! Each of the six axes (of the pose, or the legs) has a [`Shape`] about an offset. All of them begin and end together at the
 //! `center`, smoothly: the wave is
@@ -15,7 +15,7 @@ mod shape;
 mod words;
 
 pub use shape::{AxisWave, Shape, TONES, Tone, step_of};
-pub use words::WORDS;
+pub use words::{LARGEST, WORDS};
 
 use crate::motion::Motion;
 use crate::real::Real;
@@ -113,6 +113,8 @@ pub struct Wave<T> {
     cursors: [Cursor; 6],
     /// Number of set-points so far.
     sequence: u32,
+    /// Whether it is of the voltages of an open drive.
+    drives: bool,
 }
 
 impl<T: Real> Wave<T> {
@@ -127,7 +129,20 @@ impl<T: Real> Wave<T> {
             stop: false,
             cursors: [Cursor::new(); 6],
             sequence: 0,
+            drives: false,
         }
+    }
+
+    /// Of the voltages of an open drive, if `drives`.
+    #[must_use]
+    pub const fn of_drive(self, drives: bool) -> Self {
+        Self { drives, ..self }
+    }
+
+    /// Whether it is of the voltages of an open drive.
+    #[must_use]
+    pub const fn drives(&self) -> bool {
+        self.drives
     }
 
     /// Its state.

@@ -167,7 +167,7 @@ fn codes_of(row: &[u64; INPUT_WORDS]) -> [i32; CHANNELS] {
 #[allow(unsafe_code)] // `no_mangle`: specgen looks this symbol up in the image.
 fn specgen_timed_tick(timed: &mut Fixture<'_>) {
     if let Some(motion) = timed.wave.advance() {
-        waves::write(&motion, timed.wave.sequence(), &mut timed.waved);
+        waves::write(&motion, timed.wave.sequence(), false, &mut timed.waved);
     }
     timed.board.tick(&mut timed.exchange, TargetStatus::default());
     // As in the exchange, which does not combine its command (here from the rows) with a wave.

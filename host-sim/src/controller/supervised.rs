@@ -20,11 +20,9 @@ const MORE_OUTPUTS: usize = 2;
 /// The supervisor's word of an output row, decoded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct MachineWord {
-    /// 0 disarmed, 1 arming, 2 running, 3 holding, 4 ramping down, 5 faulted.
+    /// Number of a [`Phase`].
     pub phase: u8,
-    /// 0 none, 1 gauge not finite, 2 gauge range, 3 gauge stuck, 4 gauge disagreement, 5 tracking error, 6 voltage saturation,
-    /// 7 slew saturation, 8 missed tick, 9 link lost, 10 integrity, 11 converter, 12 emergency stop, 13 host gone, 14 wiring,
-    /// 15 stalled, 16 oscillation.
+    /// Number of a [`Cause`].
     pub cause: u8,
     /// Whether the amplifiers are on.
     pub amplifier_on: bool,

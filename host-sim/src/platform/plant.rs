@@ -2,7 +2,7 @@
 
 use super::contact::{WorkPart, Wrench};
 use super::imperfections::Modes;
-use super::linear::{LANES, Lane, Matrix6, Six, lanes_of};
+use super::linear::{LANES, Lane, Matrix6, Six, apply, inverse, lanes_of};
 use super::long_step;
 use super::parameters::PlatformParameters;
 use super::specimen::Specimen;
@@ -25,6 +25,8 @@ pub struct PlatformPlant {
     rest: Lane,
     /// Free displacements relative to those at rest, m.
     displacement: Lane,
+    /// Displacements that drive the structure, per free displacement of each leg; none if each has its own.
+    coupling: Option<Matrix6>,
     structure: Structure,
     /// Lag of the gauges, for each coordinate of the pose; none without lag.
     gauges: Option<[SmoothLag; 6]>,
@@ -53,6 +55,7 @@ impl PlatformPlant {
             peaks: specimen.legs.each_ref().map(|leg| leg.u_max),
             rest: [0.0; LANES],
             displacement: [0.0; LANES],
+            coupling: None,
             structure,
             gauges: (lag > 0.0).then(|| std::array::from_fn(|_| SmoothLag::new(lag))),
             modes,
@@ -60,6 +63,15 @@ impl PlatformPlant {
             long_steps: false,
             long: None,
         }
+    }
+
+    /// Couples the legs by E, their `cross_talk`: free displacements d drive the structure like (I + E)⁻¹ d. Steps then are
+    /// small.
+    pub fn couple(&mut self, cross_talk: &Matrix6) {
+        let unit = |row: usize, column: usize| if row == column { 1.0 } else { 0.0 };
+        let whole = std::array::from_fn(|i| std::array::from_fn(|j| cross_talk[i][j] + unit(i, j)));
+        self.coupling = Some(inverse(&whole));
+        self.shorten();
     }
 
     /// Sets the longest integration step, s (> 0).
@@ -89,7 +101,7 @@ impl PlatformPlant {
     /// Starts long steps of `step` (s) if possible.
     fn lengthen(&mut self, step: f64) {
         self.shorten();
-        if self.modes.as_ref().is_some_and(|modes| modes.in_legs()) {
+        if self.coupling.is_some() || self.modes.as_ref().is_some_and(|modes| modes.in_legs()) {
             return;
         }
         self.long = StructureLanes::of(&self.structure, step, self.actuators.lags()).map(Box::new);
@@ -184,6 +196,9 @@ impl PlatformPlant {
             let mut driven = self.free_displacements();
             if let Some(modes) = self.modes.as_mut().filter(|modes| modes.in_legs()) {
                 driven = modes.legs_follow(&earlier, &driven, step);
+            }
+            if let Some(coupling) = &self.coupling {
+                driven = apply(coupling, &driven);
             }
             self.structure.advance(&driven);
             let after = [self.structure.pose(), self.structure.rate()];

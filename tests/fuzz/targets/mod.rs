@@ -122,7 +122,7 @@ fn operator(input: &[u8]) {
     }
     for single in [false, true] {
         match read_wave(&text, 1e-4, single) {
-            Ok((words, _)) => assert!(!words.is_empty()),
+            Ok(wave) => assert!(!wave.words.is_empty()),
             Err(why) => assert!(!why.is_empty()),
         }
     }

@@ -6,8 +6,8 @@ use specgen_tests::Emitted;
 use std::collections::BTreeMap;
 
 pub use super::oracle::{
-    ACKNOWLEDGE, AMPLIFIER, AMPLIFIER_FAULT, ARM, ARMING, DISARMED, FAULTED, HOLD, HOLDING, NOTHING, RAMP_DOWN,
-    RAMPING, RUN, RUNNING, STALLED,
+    ACKNOWLEDGE, AMPLIFIER, AMPLIFIER_FAULT, ARM, ARMING, DISARMED, DRIVE, DRIVING, FAULTED, HOLD, HOLDING, NOTHING,
+    RAMP_DOWN, RAMPING, RUN, RUNNING, STALLED, WORKSPACE,
 };
 
 /// A converter whose codes meet every threshold of the grid: 2.5 mV a code, 1250 codes a cell.
@@ -251,6 +251,15 @@ impl Bench {
         self.input[more + 1] = events;
     }
 
+    /// Commands these voltages in place of the set-point.
+    pub fn drive(&mut self, voltages: [f64; 6]) {
+        let [command, first] = ["command", "setpoint[0]"].map(|name| self.input_at(name));
+        self.input[command] = 4;
+        for (leg, voltage) in voltages.into_iter().enumerate() {
+            self.input[first + leg] = self.scalar.encode(voltage);
+        }
+    }
+
     /// Steps the row as it stands and checks what must always hold.
     pub fn step(&mut self) -> MachineWord {
         let before = self.codes();
@@ -271,13 +280,8 @@ impl Bench {
             let step = (code - before).abs();
             assert!(step <= self.max_step, "tick {}: leg {leg} moves by {step} codes", self.tick);
         }
-        assert!(
-            self.word.phase <= FAULTED && self.word.cause <= AMPLIFIER_FAULT,
-            "tick {}: {:?}",
-            self.tick,
-            self.word
-        );
-        let powered = matches!(self.word.phase, ARMING | RUNNING | HOLDING | RAMPING);
+        assert!(self.word.phase <= DRIVING && self.word.cause <= WORKSPACE, "tick {}: {:?}", self.tick, self.word);
+        let powered = !matches!(self.word.phase, DISARMED | FAULTED);
         assert_eq!(self.word.amplifier_on, powered, "tick {}: amplifiers", self.tick);
         // A platform in motion is first brought to rest.
         let stands = target_before == self.target();

@@ -36,7 +36,7 @@ fn causes_and_what_they_do_are_those_of_the_runtime() {
 #[test]
 fn phases_are_those_of_the_runtime() {
     let rows = rows("| phase | word |");
-    assert_eq!(rows.len(), 6);
+    assert_eq!(rows.len(), 7);
     for (word, row) in (0..).zip(&rows) {
         let phase = Phase::from_word(word).expect("a phase");
         assert_eq!(row[1], word.to_string());

@@ -25,7 +25,7 @@ fn fuzz(kind: Kind, more: &[(&str, &str)], name: &str) {
     let mut input = vec![0; inputs.len()];
     let mut output = vec![0; outputs.len()];
     let mut codes = [0_i64; 6];
-    let mut phases = [0_u64; 6];
+    let mut phases = [0_u64; 7];
     let mut request = 0;
     let count = ticks();
     for tick in 0..count {
@@ -33,9 +33,9 @@ fn fuzz(kind: Kind, more: &[(&str, &str)], name: &str) {
         // A stretch of one request is long enough to get somewhere; nearly always a sensible one.
         if tick % 16 == 0 {
             request = match dice >> 32 & 7 {
-                0..=2 => [1, 1, 2, 2, 4, 5][usize::from(machine_phase(&output, status))],
+                0..=2 => [1, 1, 2, 6, 4, 5, 6][usize::from(machine_phase(&output, status))],
                 3 => 0,
-                _ => [1, 2, 2, 2, 3, 4, 5, u64::MAX][(dice >> 40 & 7) as usize],
+                _ => [1, 2, 2, 6, 3, 4, 5, u64::MAX][(dice >> 40 & 7) as usize],
             };
         }
         // Raw bits in every word now and then, else in none or in one: most ticks must get past the gauges.
@@ -46,6 +46,13 @@ fn fuzz(kind: Kind, more: &[(&str, &str)], name: &str) {
         }
         if kind == Kind::Platform && !wild {
             input[0] = dice >> 8 & 3;
+            if machine_phase(&output, status) == DRIVING && dice >> 10 & 7 > 0 {
+                input[0] = 4;
+                for word in &mut input[3..9] {
+                    // From below the lowest voltage to beyond the highest.
+                    *word = scalar.encode(scalar.decode(*word) * 10e6 - 20.0);
+                }
+            }
             input[1] = dice >> 12 & 3;
             input[2] = dice >> 16 & 1;
         }
@@ -75,7 +82,7 @@ fn fuzz(kind: Kind, more: &[(&str, &str)], name: &str) {
             assert!((now - codes[leg]).abs() <= max_step, "{name}, tick {tick}: leg {leg} jumps");
             codes[leg] = now;
         }
-        let powered = matches!(word.phase, ARMING | RUNNING | HOLDING | RAMPING);
+        let powered = !matches!(word.phase, DISARMED | FAULTED);
         assert_eq!(word.amplifier_on, powered, "{name}, tick {tick}");
         phases[usize::from(word.phase)] += 1;
     }
@@ -86,7 +93,7 @@ fn fuzz(kind: Kind, more: &[(&str, &str)], name: &str) {
 }
 
 fn machine_phase(output: &[u64], status: usize) -> u8 {
-    output[status + 1] as u8 % 6
+    output[status + 1] as u8 % 7
 }
 
 #[test]

@@ -4,7 +4,9 @@
 mod begin;
 pub mod bench;
 mod bits;
+mod cross_talk;
 mod document;
+mod drive;
 mod fuzz;
 mod lost;
 #[path = "../../../firmware/runtime/tests/all/supervisor/oracle.rs"]

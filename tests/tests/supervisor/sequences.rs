@@ -28,7 +28,7 @@ pub fn run(bench: &mut Bench, seed: u64, sequences: u32, mut each: impl FnMut(&B
         let away = [0, 0, 0, 3, 8, 12, 24, 24][draw(8) as usize];
         bench.frozen = [false; 6];
         bench.offset = [0.0; 6];
-        let mut request = draw(7);
+        let mut request = draw(8);
         let base = bench.setpoint[0];
         for tick in 0..TICKS {
             if tick % 8 == 0 {
@@ -36,8 +36,9 @@ pub fn run(bench: &mut Bench, seed: u64, sequences: u32, mut each: impl FnMut(&B
                     (true, DISARMED, _) => [ARM, NOTHING][(tick as usize / 8) % 2],
                     (true, ARMING | HOLDING | RUNNING, 8) => NOTHING,
                     (true, ARMING | HOLDING | RUNNING, _) => RUN,
+                    (true, DRIVING, _) => RUN,
                     (true, FAULTED, _) => [NOTHING, ACKNOWLEDGE, NOTHING][tick as usize / 8],
-                    _ => draw(7),
+                    _ => draw(8),
                 };
             }
             let mut events = 0;
@@ -62,6 +63,9 @@ pub fn run(bench: &mut Bench, seed: u64, sequences: u32, mut each: impl FnMut(&B
                 };
             }
             bench.prepare(request, events);
+            if bench.kind == Kind::Platform && bench.word.phase == DRIVING {
+                bench.drive(std::array::from_fn(|_| draw(120) as f64 - 10.0));
+            }
             let gauges = bench.gauges();
             if wrong && kind == 3 {
                 bench.input[gauges + gauge] = bench.scalar.encode(amount);
@@ -82,7 +86,14 @@ pub fn run(bench: &mut Bench, seed: u64, sequences: u32, mut each: impl FnMut(&B
 type VisitedEdges = BTreeSet<(u8, u8)>;
 
 /// Steps the oracle beside a controller; phase and cause of every tick must be the same.
-fn follow(bench: &mut Bench, mut oracle: Oracle, max_step: i64, sequences: u32) -> VisitedEdges {
+/// `workspace`: that of a platform.
+fn follow(
+    bench: &mut Bench,
+    mut oracle: Oracle,
+    workspace: Option<[f64; 6]>,
+    max_step: i64,
+    sequences: u32,
+) -> VisitedEdges {
     let mut met = VisitedEdges::new();
     let mut ticks = 0_u64;
     let rest = bench.rest;
@@ -90,7 +101,16 @@ fn follow(bench: &mut Bench, mut oracle: Oracle, max_step: i64, sequences: u32) 
         let more = bench.input.len() - 2;
         let ran = oracle.phase == RUNNING;
         let codes = bench.codes_of(before);
-        oracle.decide(bench.input[more], bench.input[more + 1], codes.iter().all(|code| *code == rest));
+        let poses = workspace.map(|_| [bench.six_of(before, "pose"), bench.six("pose")]);
+        let mut request = bench.input[more];
+        if let (DRIVE, HOLDING, Some([pose, _])) = (request, oracle.phase, poses) {
+            // It comes to rest first.
+            let moves = bench.word.phase == HOLDING && bench.six_of(before, "target") != bench.six("target");
+            if moves || nears_the_end(workspace, &[pose; 2]) {
+                request = HOLD;
+            }
+        }
+        oracle.decide(request, bench.input[more + 1], codes.iter().all(|code| *code == rest));
         let anew = oracle.begins_anew(ran);
         let word = bench.word;
         assert_eq!(
@@ -115,12 +135,24 @@ fn follow(bench: &mut Bench, mut oracle: Oracle, max_step: i64, sequences: u32) 
         };
         let status = bench.output[bench.at("status")];
         oracle.observe(words, &readings, &expected, &errors, [&codes, &bench.codes()], status, max_step);
+        if poses.is_some_and(|poses| nears_the_end(workspace, &poses)) {
+            oracle.nears_the_end();
+        }
     });
     println!("{:?}: {sequences} sequences, {ticks} ticks; {} pairs of phase and cause: {met:?}", bench.kind, met.len());
-    for phase in 0..=5 {
+    for phase in 0..=6 {
         assert!(met.iter().any(|(found, _)| *found == phase), "phase {phase} never came");
     }
     met
+}
+
+/// Whether the platform would be beyond 31/32 of its workspace 2 ms after the second pose, a tick of 100 µs after the first.
+fn nears_the_end(workspace: Option<[f64; 6]>, [before, pose]: &[[f64; 6]; 2]) -> bool {
+    let within = |(axis, bound): (usize, f64)| {
+        let later = pose[axis] + (pose[axis] - before[axis]) * 20.0;
+        (-bound * 31.0 / 32.0..=bound * 31.0 / 32.0).contains(&later)
+    };
+    workspace.is_some_and(|bounds| !bounds.into_iter().enumerate().all(within))
 }
 
 /// What the gauges of six legs ought to read, and how far each leg is from its demand.
@@ -157,7 +189,7 @@ fn phases_and_causes_of_random_sequences_are_those_of_the_oracle() {
     let emitted = emitted("supervisor-sequences", "legs.toml", &[]);
     let mut bench = Bench::new(Kind::Legs, &emitted, &[("setpoint_kind", 1.0), ("mode", 2.0)]);
     let max_step = i64::from(emitted.compiled.ir.defaults.max_step);
-    let met = follow(&mut bench, Oracle::new(Bounds::legs()), max_step, sequences());
+    let met = follow(&mut bench, Oracle::new(Bounds::legs()), None, max_step, sequences());
     for cause in (1..=13).chain([AMPLIFIER_FAULT]) {
         assert!(met.iter().any(|(_, found)| *found == cause), "cause {cause} never came: {met:?}");
     }
@@ -172,9 +204,11 @@ fn phases_and_causes_of_a_platform_are_those_of_the_oracle() {
     let max_step = i64::from(emitted.compiled.ir.defaults.max_step);
     let model = &emitted.compiled.model;
     let ([x, y, z], [a, b, c]) = (model.workspace.translation, model.workspace.rotation);
-    let bounds = Bounds::platform([x, y, z, a, b, c], model.sensor.range);
+    let workspace = [x, y, z, a, b, c];
+    let bounds = Bounds::platform(workspace, model.sensor.range);
     // Fewer do not meet every cause.
-    let met = follow(&mut bench, Oracle::new(bounds.clone()), max_step, specgen_tests::length(2_000, 20_000));
+    let count = specgen_tests::length(2_000, 20_000);
+    let met = follow(&mut bench, Oracle::new(bounds.clone()), Some(workspace), max_step, count);
     let causes = [8, 9, 10, 11, 12, 13, AMPLIFIER_FAULT, 1, 4, 6];
     for &cause in &causes[..specgen_tests::length(7, causes.len())] {
         assert!(met.iter().any(|(_, found)| *found == cause), "cause {cause} never came: {met:?}");
@@ -182,7 +216,8 @@ fn phases_and_causes_of_a_platform_are_those_of_the_oracle() {
     // The comparison can fail: an oracle whose gauges are given a tick more is distinguished.
     let other = Bounds { gauge_ticks: bounds.gauge_ticks + 1, ..bounds };
     let mut bench = Bench::new(Kind::Platform, &emitted, &[("mode", 6.0)]);
-    let followed = catch_unwind(AssertUnwindSafe(|| follow(&mut bench, Oracle::new(other), max_step, 1000)));
+    let followed =
+        catch_unwind(AssertUnwindSafe(|| follow(&mut bench, Oracle::new(other), Some(workspace), max_step, 1000)));
     assert!(followed.is_err(), "the oracle of other times was not distinguished");
 }
 
@@ -220,6 +255,6 @@ fn legs_that_rest_elsewhere_are_followed_by_the_oracle_too() {
             continue;
         }
         let max_step = i64::from(emitted.compiled.ir.defaults.max_step);
-        follow(&mut Bench::new(kind, &emitted, settings), Oracle::new(Bounds::legs()), max_step, 2000);
+        follow(&mut Bench::new(kind, &emitted, settings), Oracle::new(Bounds::legs()), None, max_step, 2000);
     }
 }

@@ -5,7 +5,7 @@ use specgen_runtime::supervisor::Reaction;
 use specgen_tests::Emitted;
 use std::collections::BTreeMap;
 
-const NAMES: [&str; 18] = [
+const NAMES: [&str; 19] = [
     "none",
     "gauge not finite",
     "gauge range",
@@ -24,6 +24,7 @@ const NAMES: [&str; 18] = [
     "stalled",
     "",
     "amplifier fault",
+    "end of the workspace",
 ];
 
 /// What is wrong from now on, tick by tick, for one cause.

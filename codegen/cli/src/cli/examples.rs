@@ -287,6 +287,11 @@ Examples:
   specgen identify gains run.rec --spec platform.toml -o gains
       writes six tables to gains/, prints the line of the spec to use them";
 
+pub const CROSS_TALK: &str = "\
+Examples:
+  specgen identify cross-talk leg0.csv leg1.csv leg2.csv leg3.csv leg4.csv leg5.csv
+      prints actuator.cross_talk; each file is of `watch` while one leg is driven";
+
 pub const RATE: &str = "\
 Examples:
   specgen identify rate record.csv fast.csv --drive 0:100 --grid 16 -o leg

@@ -10,7 +10,7 @@ use specgen_language::model::LegModelKind;
 use specgen_language::outcome::Failure;
 use specgen_language::output::check_table;
 use specgen_language::ui::Ui;
-use specgen_report::identify::{Bench, estimates, everett, gains, linear, predict, rate, refit};
+use specgen_report::identify::{Bench, cross_talk, estimates, everett, gains, linear, predict, rate, refit};
 
 use super::number::number;
 use super::path_roles::{InputFile, OutputFileOrFolder, OutputFolder, TableFile};
@@ -40,6 +40,8 @@ enum Kind {
     Response(ResponseArguments),
     /// Gain of each leg of a platform relative to its table, from a recorded run; writes the six tables.
     Gains(GainsArguments),
+    /// Cross-talk of the legs of an assembled platform, from records of `watch` in which one leg after the other is driven.
+    CrossTalk(CrossTalkArguments),
     /// Calibration of a gauge from its voltage and a reference.
     Gauge(GaugeArguments),
     /// Displacement that a table or a spec predicts for a drive, compared with the measured one.
@@ -136,6 +138,15 @@ struct GainsArguments {
     /// Folder for the six tables, leg0.csv to leg5.csv, within that of the spec.
     #[arg(short, long, value_name = "DIR")]
     output: Option<OutputFolder>,
+}
+
+/// Arguments of `identify cross-talk`.
+#[derive(Args, Debug)]
+#[command(after_help = super::examples::CROSS_TALK)]
+struct CrossTalkArguments {
+    /// Files of `watch`, for legs 0 to 5 in order: three raised cosines of 20 V of that leg alone, 0.5 s each.
+    #[arg(required = true, value_name = "RECORD")]
+    records: Vec<InputFile>,
 }
 
 /// Arguments of `identify gauge`.
@@ -307,6 +318,10 @@ pub fn run(arguments: &Arguments, words: &[String], ui: &mut Ui) -> Result<(), F
         }
         Some(Kind::Gains(GainsArguments { recording, spec, output })) => {
             gains::run(recording, spec, output.as_deref(), ui)
+        }
+        Some(Kind::CrossTalk(CrossTalkArguments { records })) => {
+            let records: Vec<_> = records.iter().map(|record| record.to_path_buf()).collect();
+            cross_talk::run(&records, ui)
         }
         Some(Kind::Gauge(GaugeArguments { record, degree, table, bench })) => {
             estimates::gauge(record, *degree, table.as_deref(), &bench.bench()?, ui)

@@ -7,14 +7,18 @@
 //! motions within the declared limits by running that kernel on polynomials with a remainder ([`specgen_numerics::Taylor`]), without
 //! sampling. Terms of P are left out, the smallest first, as far as the tolerance allows. Q is kept complete: its error would grow
 //! with the acceleration of stops and streams.
+//!
+//! Joints that are stiff, and gauges that are tilted, couple the legs: leg i reaches the length l_i with l_i + Σ E_ij l_j of its own
+//! displacement. To first order that is E J h, another load that is known: it is part of P.
 
+use super::kinematics::leg_jacobian;
 use super::linear::with_alike;
 use super::setpoint::motions::{self, Motions};
 use crate::figure::figure;
 use crate::ir::{Affine, Dynamics, LEGS, Load, LoadBound, Scalar, Setpoints};
-use specgen_language::diagnostic::Diagnostic;
+use specgen_language::diagnostic::{Diagnostic, Place, codes};
 use specgen_language::model::{DynamicsChoice, Model, TaskSpace};
-use specgen_numerics::{Expansion, expand_leg_forces};
+use specgen_numerics::{Expansion, expand_leg_forces, multiply6};
 
 /// Default of the largest error, as a share of the converter's step.
 const SHARE_OF_STEP: f64 = 0.1;
@@ -39,9 +43,32 @@ pub(super) fn lower(
     let tracked = &spaces[0];
     let affine = tracked.affine(scalar, tolerance);
     let bounds = spaces.each_ref().map(|space| space.bound(&affine));
-    let operations = [tracked.operations, 2 * affine.terms()];
     let taken = task.dynamics == DynamicsChoice::Cheapest && bounds[0].error <= tolerance;
-    Ok(Load { affine: taken.then_some(affine), tolerance, bounds, operations })
+    let own = |coupling: &[[f64; 6]; 6]| (0..LEGS).find(|leg| coupling[*leg][*leg] != 0.0);
+    if let Some(leg) = model.actuator.cross_talk.as_ref().and_then(own) {
+        let message = format!("row {leg} has an entry for leg {leg} itself; the diagonal of E is zero");
+        let key = "actuator.cross_talk";
+        let place = model.spans.get(key).cloned().map_or(Place::Whole, Place::Spec);
+        return Err(vec![Diagnostic::new(
+            codes::OUT_OF_RANGE,
+            key,
+            place,
+            message,
+            "write 0 there: it is in the leg's gain".to_owned(),
+        )]);
+    }
+    let coupled = model.actuator.cross_talk.zip(leg_jacobian(&model.geometry));
+    let cross_talk = coupled.map(|(coupling, jacobian)| multiply6(&coupling, &jacobian));
+    let with = |pose: [[f64; 6]; LEGS], more: &[[f64; 6]; LEGS]| {
+        core::array::from_fn(|leg| core::array::from_fn(|axis| scalar.round(pose[leg][axis] + more[leg][axis])))
+    };
+    let affine = match &cross_talk {
+        Some(more) => Affine { pose: with(affine.pose, more), ..affine },
+        None => affine,
+    };
+    let cross_talk = cross_talk.map(|rows| with([[0.0; 6]; LEGS], &rows));
+    let operations = [tracked.operations, 2 * affine.terms()];
+    Ok(Load { affine: taken.then_some(affine), cross_talk, tolerance, bounds, operations })
 }
 
 /// Text for `specgen check`: how the load is computed, and the proven error.

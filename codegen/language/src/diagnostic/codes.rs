@@ -282,6 +282,7 @@ codes! {
     REST_UNKNOWN = "W0650";
     PLAYS_OF_SOME_LEGS = "W0651";
     RATE_NOT_INVERTIBLE = "E0655";
+    CROSS_TALK_RECORD = "E0656";
 
     // Tuning.
     TUNE_NOTHING = "E0701";

@@ -19,6 +19,8 @@ const fn per_volt(power: i8) -> Dimension {
     Dimension::new([1, 0, 0, -power, 0, 0])
 }
 
+const CROSS_TALK: &str = "[[0, 0.004, -0.002, 0, 0, 0.001], [0.004, 0, 0.001, 0, 0, -0.002], [0, 0, 0, 0, 0, 0], [0, 0, 0, 0, 0, 0], [0, 0, 0, 0, 0, 0], [0, 0, 0, 0, 0, 0]]";
+
 section! {
     /// The piezo stacks of a leg.
     ///
@@ -42,6 +44,8 @@ section! {
         damping_ratio: f64 = number(Range::open(0.0, 1.0)), Required, "zeta" ["damping"], 0.1;
         /// Gain of that resonance as a fraction of the gain of a large loop: small and fast motion has less, because it stays within the hysteresis. Six legs with their own gauges then compensate the resonance in their demand; with [control] only `specgen identify predict` uses it.
         resonance_gain: Option<f64> = number(Range::above(0.0, 1.0)), Rule("the slope of the table after a reversal, in predictions; no compensation"), "" ["small_signal_gain", "k_s"], 0.66;
+        /// E of an assembled platform: what each leg (row) must displace beside its own length, per length of each other leg (column), because joints are stiff and gauges tilted; from `specgen identify cross-talk`. The diagonal is zero.
+        cross_talk: Option<[[f64; 6]; 6]> = Shape::Rows(6, &[Item::Number(Range::closed(-0.5, 0.5)); 6]), Optional, "E" ["crosstalk", "coupling"], CROSS_TALK;
         /// Capacitance of all stacks of a leg together; used for the amplifier's current.
         capacitance: Option<f64> = one(Dimension::CAPACITANCE, Range::above(0.0, 1.0), "uF"), Optional, "" ["C", "C_p"], "35 uF";
     }

@@ -55,7 +55,7 @@ pub(super) fn no_input() -> SessionError {
 pub(super) fn waving(error: ClientError) -> SessionError {
     match error {
         ClientError::Refused(Refusal::State) => SessionError::Refused(
-            "set-points are accepted only while the machine is running, with no wave and no lock-step in progress"
+            "set-points are accepted only while the machine is running or driving, with no wave and no lock-step in progress"
                 .to_owned(),
         ),
         other => other.into(),

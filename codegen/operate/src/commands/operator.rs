@@ -135,13 +135,14 @@ impl<P: Port> Operator<P> {
         }
         let before = self.session.status().phase;
         self.session.poll()?;
-        let [faulted, running] = [Phase::Faulted, Phase::Running].map(|phase| phase.word() as u8);
+        let faulted = Phase::Faulted.word() as u8;
+        let is_commanded = |phase: u8| Phase::from_word(u64::from(phase)).is_some_and(Phase::is_commanded);
         let status = self.session.status();
         if !self.attended && status.phase == faulted && before != faulted {
             return Err(SessionError::Fault(format!("the machine is {}, at tick {}", self.state(), status.tick)));
         }
-        if before == running && status.phase != running && !std::mem::take(&mut self.is_stopping) {
-            // The commands that follow assume a running machine.
+        if is_commanded(before) && status.phase != before && !std::mem::take(&mut self.is_stopping) {
+            // The commands that follow assume a machine that runs, or drives.
             self.was_stopped = true;
             // If it ramps down for a cause, it soon faults, which gives the better message.
             let faults = u64::from(status.phase) == Phase::RampingDown.word() && status.cause != 0;
@@ -212,6 +213,7 @@ impl<P: Port> Operator<P> {
             | Command::Goto(_)
             | Command::Watch { file: None, .. }
             | Command::Mode(_) => self.motion().map(|_| ()).map_err(nonsense),
+            Command::Ask(Request::Drive) => self.motion().map(|_| ()).map_err(nonsense),
             Command::Wave(path) => {
                 check_input(path)?;
                 self.wave_of(path).map(|_| ()).map_err(nonsense)
@@ -297,10 +299,17 @@ impl<P: Port> Operator<P> {
         self.in_control = true;
         match command {
             Command::Ask(request) => {
-                self.is_stopping = matches!(request, Request::Hold | Request::RampDown);
+                let drives = u64::from(self.session.status().phase) == Phase::Driving.word();
+                self.is_stopping = match request {
+                    Request::Hold | Request::RampDown => true,
+                    // Through a hold.
+                    Request::Run => drives,
+                    _ => false,
+                };
                 self.session.supervise(*request)?;
             }
             Command::Set(assignments) => {
+                let assignments = &self.whole_drive(assignments)?;
                 let words = self.session.assign(assignments).map_err(SessionError::Refused)?;
                 self.session.command(words).map_err(waving)?;
             }
@@ -320,6 +329,22 @@ impl<P: Port> Operator<P> {
             _ => {}
         }
         Ok(())
+    }
+
+    /// In an open drive, assignments of every leg: those that are not given keep their voltages.
+    fn whole_drive(&mut self, assignments: &[(String, String)]) -> Result<Vec<(String, String)>, SessionError> {
+        let mut all = assignments.to_vec();
+        if u64::from(self.session.status().phase) == Phase::Driving.word()
+            && let Some(place) = self.session.place()?
+        {
+            for (leg, voltage) in place.voltage.iter().enumerate() {
+                let name = format!("setpoint[{leg}]");
+                if !all.iter().any(|(given, _)| *given == name) {
+                    all.push((name, format!("{voltage:?}")));
+                }
+            }
+        }
+        Ok(all)
     }
 
     /// Words of a move from rest to `pose`, in the controller's coordinates; an error if the machine cannot make it.

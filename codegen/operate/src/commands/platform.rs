@@ -348,6 +348,9 @@ impl<P: Port> Operator<P> {
             (Phase::Holding, cause) => {
                 format!("holding because of {}: when that is fixed, `none`, then `run`", cause.name())
             }
+            (Phase::Driving, _) => {
+                "`set command=drive setpoint[0]=VOLTS …` or `wave FILE` of voltages; `hold` ends it".to_owned()
+            }
             (Phase::RampingDown, _) => "`wait disarmed`, or faulted".to_owned(),
             (Phase::Faulted, cause) => format!("fix the cause ({}), then `none`, `acknowledge`, `arm`", cause.name()),
             (Phase::Running, Cause::Oscillation) => {

@@ -173,6 +173,7 @@ fn titles() -> String {
             ["least", "mean", "most"].iter().for_each(|which| titles += &format!(",{name}[{axis}]_{which}_{unit}"));
         }
     }
+    (0..6).for_each(|leg| titles += &format!(",leg[{leg}]_m"));
     titles
 }
 
@@ -187,6 +188,7 @@ fn values(Sample { tick, time, ticks, row }: &Sample) -> String {
     row.target.iter().for_each(|value| values += &place(Some(*value)));
     (0..6).for_each(|axis| values += &spread(row.error.map(|error| error[axis])));
     row.volts.iter().for_each(|volts| values += &spread(Some(*volts)));
+    (0..6).for_each(|leg| values += &place(row.legs.map(|legs| legs[leg])));
     values
 }
 

@@ -258,7 +258,7 @@ impl<P: Port> Stage<P> {
             Some(Phase::Holding) if asked == Request::Run && self.last_command.1.elapsed() >= HELD => None,
             Some(Phase::Faulted) => Some(Request::Acknowledge),
             Some(Phase::Disarmed) => Some(Request::Arm),
-            Some(Phase::Arming | Phase::Holding) => Some(Request::Run),
+            Some(Phase::Arming | Phase::Holding | Phase::Driving) => Some(Request::Run),
             Some(Phase::RampingDown) | None => Some(asked),
         };
         match next.filter(|_| starting.since.elapsed() < UP) {
@@ -314,6 +314,7 @@ impl<P: Port> Stage<P> {
             Some(Phase::Running) if !self.to_bias => None,
             Some(Phase::Running) => Some(Request::Hold),
             Some(Phase::Holding) if was_starting => Some(Request::Hold),
+            Some(Phase::Driving) => Some(Request::Hold),
             Some(Phase::Arming) => Some(Request::RampDown),
             _ if was_starting => Some(Request::RampDown),
             _ => return Ok(()),

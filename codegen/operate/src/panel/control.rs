@@ -94,8 +94,8 @@ pub(super) fn carry_out<P: Port + 'static>(
             Ok(Value::Null)
         }
         PageRequest::Wave { name, text, .. } => {
-            let (words, center) = operator.wave_of_text(text).map_err(SessionError::Refused)?;
-            operator.start_wave(name, &words, &center, false)?;
+            let wave = operator.wave_of_text(text).map_err(SessionError::Refused)?;
+            operator.start_wave(name, &wave, false)?;
             let mut panel = panel.borrow_mut();
             panel.wave = json!({ "name": name, "tick": operator.status().tick });
             panel.clients.note("note", &format!("Page {page} started the wave {name}."), "", None);

@@ -81,7 +81,7 @@ mod tests {
         let spread = |mean| Spread { least: mean, mean, most: mean };
         let error = Some([0.0, 0.0, z, 0.0, 0.0, 0.0].map(spread));
         let phase = Phase::Running.word() as u8;
-        let row = Row { status, phase, pose: None, target: [0.0; 6], error, volts: [spread(0.0); 6] };
+        let row = Row { status, phase, pose: None, target: [0.0; 6], error, volts: [spread(0.0); 6], legs: None };
         Block { number: 0, tick: 0, every: 10, rows: vec![row; rows] }
     }
 

@@ -44,6 +44,10 @@ fn cause(cause: Cause) -> (&'static str, &'static str) {
         Cause::AmplifierFault => {
             ("An amplifier reports a fault.", "Check the amplifiers, then the cable of their fault line.")
         }
+        Cause::Workspace => (
+            "The platform came near the end of its workspace in an open drive.",
+            "Drive fewer legs at a time, or less.",
+        ),
         Cause::Stalled => ("The controller stalled.", "Was a debugger attached, or the computer suspended?"),
         Cause::Oscillation => (
             "The platform oscillates.",
@@ -146,6 +150,7 @@ pub fn message(status: &Status, rules: &Supervision, model: &Model) -> StatusMes
         }
         Some(Phase::Holding) if what.is_empty() => message("note", "Holding. The law is suspended.", "Run resumes."),
         Some(Phase::Holding) => message("warning", &format!("Holding. {what}"), advice),
+        Some(Phase::Driving) => message("note", "Open drive. A host commands the voltages.", "Hold ends it."),
         Some(Phase::RampingDown) if of == Cause::None => message("note", "Ramping down.", ""),
         Some(Phase::RampingDown) => message("error", &format!("Ramping down. {what}"), advice),
         Some(Phase::Faulted) => message("error", what, advice),

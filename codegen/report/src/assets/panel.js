@@ -260,10 +260,10 @@
     by("keep").hidden = !(mine && (state.asked || state.offered !== null));
     const steps = ["disarmed", "arming", "holding", "running"], step = steps.indexOf(phase);
     [...by("steps").children].forEach((span, k) => { span.className = k === step ? "on" : k < step ? "past" : ""; });
-    const held = ["running", "arming", "holding"].includes(phase);
+    const held = ["running", "driving", "arming", "holding"].includes(phase);
     allow(by("hold"), held ? "" : "not armed", "immediate · key H");
     allow(by("arm"), phase === "faulted" ? "faulted" : phase !== "disarmed" ? "armed" : control, "press 1\u2009s");
-    allow(by("run"), phase === "running" ? "running" : phase !== "holding" && phase !== "arming" ? "not armed" : control, "press 1\u2009s");
+    allow(by("run"), phase === "running" ? "running" : phase !== "holding" && phase !== "arming" ? (phase === "driving" ? "open drive" : "not armed") : control, "press 1\u2009s");
     allow(by("acknowledge"), phase !== "faulted" && status.cause !== 16 ? "no fault" : control, "press 1\u2009s");
     for (const [id, next] of [["arm", "disarmed"], ["run", "holding"], ["acknowledge", "faulted"]]) by(id).classList.toggle("next", phase === next && !by(id).disabled);
     const events = known.standing && known.standing.health ? known.standing.health.events_in_words : null;

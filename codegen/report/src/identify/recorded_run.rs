@@ -18,8 +18,8 @@ use specgen_language::ui::Ui;
 use specgen_numerics::displacements;
 use specgen_studies::controllers;
 
-/// Supervisor phases in which the law moves the legs: running, holding.
-const MOVING: [u8; 2] = [2, 3];
+/// Supervisor phases in which the legs move: running, holding, driving.
+const MOVING: [u8; 3] = [2, 3, 6];
 
 /// The records of a spec that a run can refit.
 pub(super) fn records(

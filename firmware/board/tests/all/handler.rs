@@ -80,7 +80,7 @@ fn what_is_refused_changes_nothing() {
     config[0] = u64::MAX;
     let good = bytes(&Config::new().to_words());
     let refused = [
-        (Request::Supervise { request: 6 }, Refusal::Word { index: 0 }),
+        (Request::Supervise { request: 7 }, Refusal::Word { index: 0 }),
         (Request::Supervise { request: 255 }, Refusal::Word { index: 0 }),
         (Request::Setpoint { words: Bytes(&[0; 8]) }, Refusal::Length { expected: COMMAND_WORDS as u16 }),
         (Request::WriteConfig { words: Bytes(&[0; 7]) }, Refusal::Length { expected: CONFIG_WORDS as u16 }),

@@ -118,3 +118,49 @@ fn a_lock_step_computes_what_the_host_computes_and_moves_nothing() {
     assert_eq!(refused(&mut client, &Request::LockstepReset { config: Bytes(&words) }), Refusal::State);
     assert_eq!(line.phase(), Phase::Running);
 }
+
+/// From a hold, with the legs somewhere: voltages of one leg, then a host that falls silent.
+#[test]
+fn a_wave_of_voltages_moves_its_leg_and_ends_with_the_host() {
+    let line = Line::new(RECORD);
+    let mut client = line.client(2);
+    running(&line, &mut client);
+    for (request, phase) in [(3, Phase::Holding), (6, Phase::Driving)] {
+        done(&mut client, &Request::Supervise { request });
+        line.tick(500);
+        assert_eq!(line.phase(), phase);
+    }
+    let Ok(Reply::Place { words, .. }) = client.ask(&Request::Place) else { unreachable!() };
+    let there: Vec<f64> = words.words(24).unwrap().skip(18).map(f64::from_bits).collect();
+    let mut settings = Settings::<f64> { center: there.try_into().unwrap(), ramp_ticks: 100, ..Settings::still() };
+    settings.axes[1] = wave(2.0, 10.0).axes[1];
+    fn start(words: &[u8]) -> Request<'_> {
+        Request::Wave { action: WaveAction::Start, words: Bytes(words) }
+    }
+    let mut elsewhere = settings;
+    elsewhere.center[3] += 12.0;
+    assert_eq!(refused(&mut client, &start(&bytes(&elsewhere.to_words()))), Refusal::State, "a leg would jump");
+    let mut high = settings;
+    high.axes[1].offset = 150.0;
+    let refusal = refused(&mut client, &start(&bytes(&high.to_words())));
+    let Refusal::Word { index } = refusal else { unreachable!() };
+    assert_eq!(wave::Refusal::of_word(usize::from(index)), wave::Refusal::Range(1));
+    let held = line.parts(|parts| parts.written).unwrap();
+    let words = bytes(&settings.to_words());
+    done(&mut client, &start(&words));
+    assert_eq!(refused(&mut client, &start(&words)), Refusal::State, "one at a time");
+    let mut moved = 0;
+    for _ in 0..900 {
+        line.tick(1);
+        let codes = line.parts(|parts| parts.written).unwrap();
+        for leg in [0, 2, 3, 4, 5] {
+            assert_eq!(codes[leg], held[leg], "leg {leg}");
+        }
+        let way = (i64::from(codes[1]) - i64::from(held[1])).abs();
+        moved = if way > moved { way } else { moved };
+    }
+    assert_eq!((line.phase(), moved > 500), (Phase::Driving, true), "{moved} codes");
+    line.tick(1100);
+    assert!(!line.with(|rig| rig.exchange.source.waves()));
+    assert_eq!(line.phase(), Phase::Holding);
+}

@@ -47,6 +47,18 @@ pub fn limits<P: SixLegs + ConstSpec>(config: &Config<P>) -> Limits<P::Real> {
     limits
 }
 
+/// Those of an open drive, which six legs do not have.
+#[must_use]
+pub fn drive_limits<P: SixLegs + ConstSpec>(config: &Config<P>) -> Limits<P::Real> {
+    limits(config)
+}
+
+/// Whether a wave of an open drive may begin: never.
+#[must_use]
+pub fn may_drive<T: Real>(_place: &[u64], _center: &[T; 6], _limits: &Limits<T>) -> bool {
+    false
+}
+
 /// Whether a wave may begin with the next tick: the present set-point, in `words`, must be its center, within an axis's
 /// motion in a tick. Otherwise legs would jump.
 ///
@@ -64,7 +76,7 @@ pub fn may_begin<T: Real>(_status: u32, words: &[u64], center: &[T; 6], limits: 
 }
 
 /// Writes the set-point into the words of a tick's input.
-pub fn write<T: Real>(motion: &Motion<T>, _sequence: u32, words: &mut [u64]) {
+pub fn write<T: Real>(motion: &Motion<T>, _sequence: u32, _drives: bool, words: &mut [u64]) {
     rest(&motion.pose, words);
 }
 

@@ -41,8 +41,11 @@ pub trait Platform: Spec<Law = TaskSpace> {
     fn modes_to_legs(&self) -> &[[Self::Real; 6]; LEGS];
     /// The inverse dynamics.
     fn body(&self) -> &dynamics::Platform<Self::Real>;
-    /// First-order model of the legs' deflection under inertia and gravity, P h + Q ḧ. None: the full dynamics.
+    /// First-order model of the legs' deflection under inertia and gravity, P h + Q ḧ, with their cross-talk. None: the
+    /// full dynamics.
     fn affine_load(&self) -> Option<&Affine<Self::Real>>;
+    /// E J, cross-talk of the legs beside the full dynamics: leg displacements (rows) per pose coordinate.
+    fn cross_talk(&self) -> Option<&[[Self::Real; 6]; LEGS]>;
     /// Leg forces at which the gauges were zeroed: gravity at rest, N.
     fn rest_force(&self) -> &[Self::Real; LEGS];
     /// Largest valid |component| of the measured wrench, N and N m.

@@ -8,7 +8,7 @@
 //! learn      e = N(h_d(t_n) − h) ;  s ← s + T_s k_I e                        (7), held where it would wind up
 //!            ν = N(Y − (q̂ − p) − δ̂ − φ̂) ;  δ̂, φ̂ ← ν                        (AII.3), (AII.5), (AII.6), in modal coordinates
 //! setpoint   h_d, ḣ_d, ḧ_d at t_{n+1}
-//! load       p = (J⁻ᵀ(M ḧ_d + C ḣ_d + G − F_int) − f_rest)/k_a                 known deflection of the legs, (7)
+//! load       p = (J⁻ᵀ(M ḧ_d + C ḣ_d + G − F_int) − f_rest)/k_a + E J h_d       known deflection of the legs, (7); cross-talk
 //!            + J⁻ᵀ k_v ė/k_a + τ (Δl(h_d(t_{n+1})) − Δl(h_d(t_n)))/T_s                damping, lead
 //! legs       q = Δl(h_d) + p + J⁻ᵀ(k_p e + s)/k_a − δ̂ − φ̂ ;  u = Γ⁻¹(q)       limited: q̂ is q within the limits
 //! ```
@@ -343,7 +343,14 @@ pub fn known_load<P: Platform>(p: P, config: &Config<P>, state: &State<P>) -> ([
         }
     };
     let load = p.body().load(target, wrench.as_ref());
-    (load.displacement, each(|leg| (load.force[leg] - p.rest_force()[leg]) * p.compliance()))
+    let deflection = each(|leg| (load.force[leg] - p.rest_force()[leg]) * p.compliance());
+    match p.cross_talk() {
+        Some(cross_talk) => {
+            let coupled = transform(cross_talk, &target.pose);
+            (load.displacement, each(|leg| deflection[leg] + coupled[leg]))
+        }
+        None => (load.displacement, deflection),
+    }
 }
 
 /// J⁻ᵀ(k_p e + s)/k_a − δ̂ − φ̂, plus active damping and J c: m of each leg.

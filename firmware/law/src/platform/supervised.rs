@@ -1,7 +1,7 @@
 //! The law under the supervisor: start, run and hold.
 
-use specgen_runtime::linear::component;
-use specgen_runtime::setpoint::{CommandKind, Generator};
+use specgen_runtime::linear::{component, each, is_within};
+use specgen_runtime::setpoint::{CommandKind, Generator, REFUSED};
 use specgen_runtime::supervisor::{Fallback, Phase};
 use specgen_runtime::{Estimate, Integral, ModalDamping as _, NotchState, Real as _, RequestCorrection as _, Transfer};
 
@@ -15,6 +15,11 @@ use crate::kinematics::leg_displacements;
 use crate::memory::LegMemory as _;
 use crate::spec::{Config, ControlLaw, LEGS, Machine, Reset, TickOutput};
 use crate::status::GAUGE_FAULT;
+
+/// Part of the workspace in which an open drive goes on.
+const NEAR_END: f64 = 31.0 / 32.0;
+/// Time for which the platform goes on at its speed after the codes stop, s: lag, two ticks, and 1/ω of the lowest mode.
+const COASTING: f64 = 2e-3;
 
 impl<P: Platform> ControlLaw<P> for TaskSpace {
     type Settings = Settings<P>;
@@ -102,8 +107,40 @@ impl<P: Platform> ControlLaw<P> for TaskSpace {
 
     #[inline]
     fn decelerate(p: P, config: &Config<P>, machine: &mut Machine<P>, input: &TickInput<P>) -> Option<u32> {
+        // After arming or an open drive the set-point is not that of the codes.
         let suspended = matches!(machine.supervisor.phase, Phase::Holding | Phase::RampingDown);
-        (suspended && machine.state.generator.can_stop()).then(|| stop(p, config, machine, input))
+        (suspended && !machine.supervisor.fresh && machine.state.generator.can_stop())
+            .then(|| stop(p, config, machine, input))
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn voltages(input: &TickInput<P>) -> Result<&[P::Real; LEGS], u32> {
+        let voltages = &input.command.target.pose;
+        match input.command.kind {
+            CommandKind::Drive if voltages.iter().all(|voltage| voltage.is_finite()) => Ok(voltages),
+            CommandKind::Hold => Err(0),
+            _ => Err(REFUSED),
+        }
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn may_drive(p: P, state: &State<P>) -> bool {
+        !state.generator.can_stop() && !Self::is_near_end(p, state, &state.pose)
+    }
+
+    #[inline]
+    fn pose(state: &State<P>) -> [P::Real; 6] {
+        state.pose
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn is_near_end(p: P, state: &State<P>, before: &[P::Real; 6]) -> bool {
+        let bound = p.pose_bound().map(|bound| bound * P::Real::from_f64(NEAR_END));
+        let ticks = p.setpoints().rate * P::Real::from_f64(COASTING);
+        !is_within(&each(|axis| state.pose[axis] + (state.pose[axis] - before[axis]) * ticks), &bound)
     }
 
     /// Pose and rate are still measured.

@@ -32,8 +32,11 @@ const STATUS: usize = 9 * LEGS;
 
 /// Words of pose and set-point, see [`place_words`].
 pub const PLACE_WORDS: usize = 24;
+/// The first of the voltages among them.
+pub(super) const VOLTAGES: usize = 18;
 
-/// Names of the input words. `command` is 0 hold, 1 stream, 2 move, 3 trajectory. `correction` is present if
+/// Names of the input words. `command` is 0 hold, 1 stream, 2 move, 3 trajectory; 4 open drive, with the voltages of the
+/// legs in `setpoint`. `correction` is present if
 /// `control.correction` is set.
 #[must_use]
 pub const fn input_names<const N: usize>() -> [&'static str; N] {
@@ -181,7 +184,7 @@ pub fn place_words<P: Platform>(p: P, state: &State<P>) -> [u64; PLACE_WORDS] {
         words[12 + axis] = place[axis].to_word();
     }
     for (leg, state) in state.legs.iter().enumerate() {
-        words[18 + leg] = p.dac().voltage(state.code).to_word();
+        words[VOLTAGES + leg] = p.dac().voltage(state.code).to_word();
     }
     words
 }

@@ -137,7 +137,7 @@ impl Backend for LinkHandler<'_> {
     fn command(&mut self, command: &Command) -> Result<(), Refusal> {
         // A wave or a pass makes the set-points: two sources would conflict. A command from before the run must not
         // take effect later.
-        if self.console.is_engaged() || !self.console.runs() {
+        if self.console.is_engaged() || !self.console.is_commanded() {
             return Err(Refusal::State);
         }
         self.console.operator.set_by_link(*command);

@@ -256,7 +256,7 @@ impl<T: Real> Generator<T> {
         }
         let accepted = match kind {
             CommandKind::Hold | CommandKind::Stream => true,
-            CommandKind::Unknown => false,
+            CommandKind::Drive | CommandKind::Unknown => false,
             CommandKind::Move => {
                 self.phase != Phase::Hold || self.begin_move(setpoints, &command.target.pose, Phase::Move)
             }

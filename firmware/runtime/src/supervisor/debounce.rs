@@ -12,7 +12,8 @@ const AT_ONCE: u32 = Cause::LinkLost.bit()
     | Cause::Integrity.bit()
     | Cause::EmergencyStop.bit()
     | Cause::Stalled.bit()
-    | Cause::AmplifierFault.bit();
+    | Cause::AmplifierFault.bit()
+    | Cause::Workspace.bit();
 
 /// The bit of the condition that a cause waits for: its own, or that of the preceding cause.
 const fn condition(cause: Cause) -> u32 {

@@ -28,6 +28,8 @@ pub(super) const FIRST_CHANNEL: u32 = 16;
 pub(super) const OSCILLATION_CONDITION: u32 = 28;
 /// Bit of [`Cause::AmplifierFault`] in conditions.
 pub(super) const AMPLIFIER_CONDITION: u32 = 31;
+/// Bit of [`Cause::Workspace`] in conditions: no other cause has number 0.
+const WORKSPACE_CONDITION: u32 = 0;
 
 choice! {
     /// Phase of the machine.
@@ -44,6 +46,8 @@ choice! {
         RampingDown = 4 => "ramping down",
         /// As disarmed, with a cause that must be acknowledged.
         Faulted = 5 => "faulted",
+        /// Open drive: the host commands the voltage of each leg, the law is suspended.
+        Driving = 6 => "driving",
     }
 }
 
@@ -53,6 +57,13 @@ impl Phase {
     #[must_use]
     pub const fn is_powered(self) -> bool {
         !matches!(self, Self::Disarmed | Self::Faulted)
+    }
+
+    /// Whether the host's commands move the machine in this phase.
+    #[inline]
+    #[must_use]
+    pub const fn is_commanded(self) -> bool {
+        matches!(self, Self::Running | Self::Driving)
     }
 }
 
@@ -72,6 +83,8 @@ choice! {
         RampDown = 4,
         /// Acknowledges a fault. Edge-triggered.
         Acknowledge = 5,
+        /// Open drive, from a hold: the law is suspended, and the host commands voltages.
+        Drive = 6,
     }
 }
 
@@ -115,12 +128,14 @@ choice! {
         Oscillation = 16 => "oscillation",
         /// [`AMPLIFIER`]. The spec sets the reaction: [`Reaction`].
         AmplifierFault = 17 => "amplifier fault",
+        /// The measured pose came near the end of the workspace in an open drive.
+        Workspace = 18 => "end of the workspace",
     }
 }
 
 impl Cause {
     /// All but [`Cause::None`], in the order of their words.
-    pub const ALL: [Self; 17] = [
+    pub const ALL: [Self; 18] = [
         Self::GaugeNotFinite,
         Self::GaugeRange,
         Self::GaugeStuck,
@@ -138,6 +153,7 @@ impl Cause {
         Self::Stalled,
         Self::Oscillation,
         Self::AmplifierFault,
+        Self::Workspace,
     ];
 
     /// Its bit in conditions: 1 << word; beyond 15, a bit that gauges and legs leave free.
@@ -147,13 +163,18 @@ impl Cause {
         match self {
             Self::Oscillation => 1 << OSCILLATION_CONDITION,
             Self::AmplifierFault => 1 << AMPLIFIER_CONDITION,
+            Self::Workspace => 1 << WORKSPACE_CONDITION,
             other => 1 << other.word(),
         }
     }
 
     /// The cause of the lowest bit; [`Cause::None`] if no bit is set.
     pub(super) const fn of_lowest(bits: u32) -> Self {
+        // Numbers decide, and that of the lowest bit is the highest.
+        let others = bits & !Self::Workspace.bit();
+        let bits = if others != 0 { others } else { bits };
         let word = match bits.trailing_zeros() {
+            WORKSPACE_CONDITION => Self::Workspace.word(),
             OSCILLATION_CONDITION => Self::Oscillation.word(),
             AMPLIFIER_CONDITION => Self::AmplifierFault.word(),
             bit => bit as u64,
@@ -187,7 +208,8 @@ pub const RAMPS_DOWN: u32 = OF_GAUGES
     | Cause::HostGone.bit()
     | Cause::Wiring.bit()
     | Cause::Stalled.bit()
-    | Cause::Oscillation.bit();
+    | Cause::Oscillation.bit()
+    | Cause::Workspace.bit();
 /// Causes that hold the codes.
 pub const HOLDS: u32 = Cause::TrackingError.bit()
     | Cause::VoltageSaturation.bit()
@@ -201,11 +223,11 @@ mod tests {
 
     #[test]
     fn words_read_back_and_others_are_refused() {
-        for word in 0..6 {
+        for word in 0..7 {
             assert_eq!(Phase::from_word(word).map(Phase::word), Some(word));
             assert_eq!(Request::from_word(word).word(), word);
         }
-        for word in 0..18 {
+        for word in 0..19 {
             assert_eq!(Cause::from_word(word).map(Cause::word), Some(word));
         }
         for (index, cause) in (1..).zip(Cause::ALL) {
@@ -215,15 +237,18 @@ mod tests {
         for bits in [0, 1 << 16, 1 << 22, 1 << 29, 1 << 30, 0x6fff_0000] {
             assert_eq!(Cause::of_lowest(bits), Cause::None, "gauges, legs, and other bits");
         }
-        assert_eq!([Cause::Oscillation.bit(), Cause::AmplifierFault.bit()], [1 << 28, 1 << 31]);
-        assert_eq!((Phase::from_word(6), Cause::from_word(18)), (None, None));
-        assert_eq!((Request::from_word(6), Request::from_word(u64::MAX)), (Request::Hold, Request::Hold));
+        assert_eq!(Cause::of_lowest(Cause::Workspace.bit() | Cause::LinkLost.bit()), Cause::LinkLost);
+        let bits = [Cause::Workspace, Cause::Oscillation, Cause::AmplifierFault].map(Cause::bit);
+        assert_eq!(bits, [1, 1 << 28, 1 << 31]);
+        assert_eq!((Phase::from_word(7), Cause::from_word(19)), (None, None));
+        assert_eq!((Request::from_word(7), Request::from_word(u64::MAX)), (Request::Hold, Request::Hold));
     }
 
     #[test]
     fn amplifiers_are_on_where_codes_may_stand_above_rest_and_every_kind_has_a_name_of_its_own() {
-        let phases: [Phase; 6] = core::array::from_fn(|word| Phase::from_word(word as u64).unwrap_or(Phase::Faulted));
-        assert_eq!(phases.map(Phase::is_powered), [false, true, true, true, true, false]);
+        let phases: [Phase; 7] = core::array::from_fn(|word| Phase::from_word(word as u64).unwrap_or(Phase::Faulted));
+        assert_eq!(phases.map(Phase::is_powered), [false, true, true, true, true, false, true]);
+        assert_eq!(phases.map(Phase::is_commanded), [false, false, true, false, false, false, true]);
         let told_apart = |names: &[&str]| {
             let apart = (0..names.len()).all(|a| (0..a).all(|b| names[a] != names[b]));
             apart && names.iter().all(|name| !name.is_empty())

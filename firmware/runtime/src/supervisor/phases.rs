@@ -109,6 +109,11 @@ impl<T: Real> Supervisor<T> {
             Phase::Arming => return self.arming(supervision, present, lasted),
             Phase::Running => self.running(supervision, begun, lasted),
             Phase::Holding => return self.holding(supervision, begun, present, lasted),
+            Phase::Driving => {
+                // The law starts from a hold.
+                let goes_on = matches!(self.request, Request::Drive | Request::None);
+                self.goes_on(supervision, goes_on, lasted);
+            }
             Phase::RampingDown => self.ramping_down(lasted, at_rest),
             Phase::Faulted => {
                 if self.request == Request::Acknowledge && begun && present == 0 && at_rest {
@@ -159,16 +164,25 @@ impl<T: Real> Supervisor<T> {
             self.cause = Cause::Oscillation;
             lasted &= !Cause::Oscillation.bit();
         }
+        let goes_on = self.request != Request::Hold;
+        if self.goes_on(supervision, goes_on, lasted) && self.request == Request::Acknowledge && begun {
+            self.recover();
+        }
+    }
+
+    /// Ramps down or holds for a request or a cause; false if so. `goes_on`: the request is not to hold.
+    fn goes_on(&mut self, supervision: &Supervision<T>, goes_on: bool, lasted: u32) -> bool {
         let ramp = lasted & supervision.ramps_down();
         if ramp != 0 {
             self.enter(Phase::RampingDown, Cause::of_lowest(ramp));
         } else if self.request == Request::RampDown {
             self.enter(Phase::RampingDown, Cause::of_lowest(lasted));
-        } else if lasted != 0 || self.request == Request::Hold {
+        } else if lasted != 0 || !goes_on {
             self.enter(Phase::Holding, Cause::of_lowest(lasted));
-        } else if self.request == Request::Acknowledge && begun {
-            self.recover();
+        } else {
+            return true;
         }
+        false
     }
 
     /// The user has acknowledged the oscillation: the full law is active again.
@@ -193,6 +207,11 @@ impl<T: Real> Supervisor<T> {
             Request::Run if present == 0 && (begun || self.cause == Cause::None) => {
                 self.enter(Phase::Running, Cause::None);
                 return true;
+            }
+            Request::Drive if present == 0 && (begun || self.cause == Cause::None) => {
+                // The law starts again where the legs then are.
+                self.fresh = true;
+                self.enter(Phase::Driving, Cause::None);
             }
             _ => {}
         }
@@ -219,7 +238,7 @@ impl<T: Real> Supervisor<T> {
         match phase {
             // The fallback lasts until the user acknowledges it, or arms again.
             Phase::Running if self.oscillation.stage != Fallback::None => self.cause = Cause::Oscillation,
-            Phase::Running | Phase::Holding | Phase::RampingDown => self.oscillation.forgive(),
+            Phase::Running | Phase::Driving | Phase::Holding | Phase::RampingDown => self.oscillation.forgive(),
             Phase::Disarmed | Phase::Arming | Phase::Faulted => self.oscillation = Oscillation::new(),
         }
         // A suspicion belongs to the phase in which it arose. Ramp and hold keep it.
@@ -293,7 +312,7 @@ impl<T: Real> Supervisor<T> {
     #[inline]
     pub fn step_to_rest(&mut self, supervision: &Supervision<T>, max_step: i32) -> i32 {
         match self.phase {
-            Phase::Holding | Phase::Running => 0,
+            Phase::Holding | Phase::Running | Phase::Driving => 0,
             Phase::Disarmed | Phase::Arming | Phase::Faulted => max_step,
             Phase::RampingDown => {
                 self.ticks = self.ticks.saturating_add(1);
@@ -310,6 +329,12 @@ impl<T: Real> Supervisor<T> {
     #[inline]
     pub fn see(&mut self, faults: u32, limited: u32, words: &[T; 6], moved: &[i32; 6], max_step: i32) {
         self.seen = if faults | limited == 0 { 0 } else { seen(faults, limited, words, moved, max_step) };
+    }
+
+    /// The measured pose came near the end of the workspace. After [`Supervisor::see`].
+    #[cold]
+    pub fn see_end_of_workspace(&mut self) {
+        self.seen |= Cause::Workspace.bit();
     }
 
     /// Takes a sample of the channel whose turn it was.

@@ -3,7 +3,7 @@
 use super::shape::{AxisWave, Shape, TONES, Tone};
 use super::{Refusal, Settings};
 use crate::real::Real;
-use crate::snapshot::{InvalidState, LARGEST_PLACE, Reader, Writer};
+use crate::snapshot::{InvalidState, Reader, Writer};
 
 /// Words of an axis: kind (index in [`Shape`]), offset, amplitude, and four more: steps before phases, levels before
 /// ticks.
@@ -12,6 +12,8 @@ const AXIS: usize = 7;
 pub const WORDS: usize = 6 + 6 * AXIS + TONES * 3 + 2;
 /// Largest tick count: a day at 10 kHz.
 const MOST: i32 = 1 << 30;
+/// Largest number of a wave, far beyond every limit: m and rad, or V of an open drive.
+pub const LARGEST: f64 = 1e4;
 /// Steps stay below half a turn.
 const HALF_TURN: u64 = (1 << 63) - 1;
 
@@ -75,7 +77,7 @@ impl<T: Real> Settings<T> {
     }
 
     fn read(&mut self, words: &mut Reader<'_>) -> Result<(), InvalidState> {
-        words.reals(&mut self.center, LARGEST_PLACE)?;
+        words.reals(&mut self.center, LARGEST)?;
         for axis in &mut self.axes {
             *axis = AxisWave::load(words)?;
         }
@@ -101,7 +103,7 @@ impl<T: Real> Tone<T> {
     }
 
     fn load(words: &mut Reader<'_>) -> Result<Self, InvalidState> {
-        let amplitude: T = words.real(LARGEST_PLACE)?;
+        let amplitude: T = words.real(LARGEST)?;
         if amplitude < T::ZERO {
             return Err(words.refused());
         }
@@ -134,8 +136,8 @@ impl<T: Real> AxisWave<T> {
 
     fn load(words: &mut Reader<'_>) -> Result<Self, InvalidState> {
         let kind = words.word(6)?;
-        let offset = words.real(LARGEST_PLACE)?;
-        let amplitude: T = words.real(LARGEST_PLACE)?;
+        let offset = words.real(LARGEST)?;
+        let amplitude: T = words.real(LARGEST)?;
         let signed = matches!(kind, 1 | 6);
         if amplitude < T::ZERO && !signed {
             return Err(words.refused());

@@ -1,7 +1,7 @@
 //! A sustained oscillation of the error: how fast it is detected, what each stage of the fallback does to it, and that nothing that a
 //! sound machine does is taken for one.
 
-mod machine;
+pub mod machine;
 mod quiet;
 
 use host_sim::controller::TickController;

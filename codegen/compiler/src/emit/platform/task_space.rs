@@ -12,6 +12,10 @@ pub fn emit(ir: &Ir, task: &TaskSpace) -> TokenStream {
     let matrix = |rows: &[[f64; 6]; 6]| literal::matrix(ir.scalar, rows);
     let law = &task.law;
     let load = literal::constant!(ir.scalar, affine, &task.load);
+    let cross_talk = task.load.cross_talk.as_ref().map_or(quote! { None }, |rows| {
+        let rows = matrix(rows);
+        quote! { Some(#rows) }
+    });
     let load_doc = format!(
         " To first order inertia and gravity deflect the legs by P h + Q ḧ: at most {:.3e} m off in moves and trajectories, {:.1e} in stops; \
          from `control.dynamics`. None: by the whole kernel.",
@@ -58,6 +62,8 @@ pub fn emit(ir: &Ir, task: &TaskSpace) -> TokenStream {
         pub const MODES_TO_LEGS: [[Real; 6]; LEGS] = #modes_to_legs;
         #[doc = #load_doc]
         pub const AFFINE_LOAD: Option<Affine<Real>> = #load;
+        /// E J: cross-talk of the legs, beside the whole kernel, m/m and m/rad; from `actuator.cross_talk`.
+        pub const CROSS_TALK: Option<[[Real; 6]; LEGS]> = #cross_talk;
         /// Leg forces under which the gauges were zeroed: gravity at rest, N.
         pub const REST_FORCE: [Real; LEGS] = [#rest_force];
         /// Largest plausible |component| of the measured wrench, N and N m; from `control.interaction`.

@@ -153,7 +153,7 @@ fn commands_have_words_and_other_words_are_none() {
     for (word, kind) in (0..).zip(kinds) {
         assert_eq!(CommandKind::from_word(word), kind);
     }
-    assert_eq!([4, u64::MAX].map(CommandKind::from_word), [CommandKind::Unknown; 2]);
+    assert_eq!([5, u64::MAX].map(CommandKind::from_word), [CommandKind::Unknown; 2]);
 }
 
 /// The way that takes the longest phase at full speed is one, a way that takes a tick more is none.

@@ -7,6 +7,7 @@ pub const RUNNING: u8 = 2;
 pub const HOLDING: u8 = 3;
 pub const RAMPING: u8 = 4;
 pub const FAULTED: u8 = 5;
+pub const DRIVING: u8 = 6;
 
 pub const NOTHING: u64 = 0;
 pub const ARM: u64 = 1;
@@ -14,6 +15,7 @@ pub const RUN: u64 = 2;
 pub const HOLD: u64 = 3;
 pub const RAMP_DOWN: u64 = 4;
 pub const ACKNOWLEDGE: u64 = 5;
+pub const DRIVE: u64 = 6;
 
 /// Missed tick, link lost, integrity, converter, stop, stalled, fault of an amplifier.
 pub const EVENTS: [u64; 7] = [1, 2, 4, 8, 16, STALLED, AMPLIFIER];
@@ -22,6 +24,8 @@ pub const AMPLIFIER: u64 = 64;
 /// The cause of the last, and its bit in conditions.
 pub const AMPLIFIER_FAULT: u8 = 17;
 const AMPLIFIER_BIT: u8 = 31;
+/// The end of the workspace in an open drive; its bit is the first.
+pub const WORKSPACE: u8 = 18;
 
 /// Which channel is looked at, tick by tick.
 const TURNS: [usize; 36] =
@@ -87,7 +91,7 @@ impl Bounds {
     fn act(&self, cause: u8) -> Act {
         match cause {
             10 | 12 => Act::Off,
-            1..=4 | 11 | 13 | 15 => Act::Ramp,
+            1..=4 | 11 | 13 | 15 | WORKSPACE => Act::Ramp,
             AMPLIFIER_FAULT => self.amplifier,
             _ => Act::Hold,
         }
@@ -155,7 +159,7 @@ impl Oracle {
 
     /// The phase and cause of the coming interval.
     pub fn decide(&mut self, request: u64, events: u64, at_rest: bool) {
-        let request = if request > 5 { HOLD } else { request };
+        let request = if request > DRIVE { HOLD } else { request };
         let new_request = std::mem::replace(&mut self.request, request) != request;
         let mut present = self.seen.clone();
         for (bit, cause) in EVENTS.into_iter().zip([8, 9, 10, 11, 12, 15, AMPLIFIER_FAULT]) {
@@ -169,7 +173,12 @@ impl Oracle {
             }
         }
         self.conditions = present.iter().fold(self.concerned << 16, |bits, cause| {
-            bits | 1 << if *cause == AMPLIFIER_FAULT { AMPLIFIER_BIT } else { *cause }
+            bits | 1
+                << match *cause {
+                    AMPLIFIER_FAULT => AMPLIFIER_BIT,
+                    WORKSPACE => 0,
+                    other => other,
+                }
         });
         for (gauge, channel) in self.channels.iter().enumerate() {
             self.conditions |= u64::from(channel.present.contains(&true)) << (16 + gauge);
@@ -192,7 +201,7 @@ impl Oracle {
                 lasted.push(cause);
             }
         }
-        lasted.extend(present.iter().filter(|cause| matches!(cause, 9 | 10 | 12 | 15)));
+        lasted.extend(present.iter().filter(|cause| matches!(**cause, 9 | 10 | 12 | 15 | WORKSPACE)));
         // Amplifiers that are off anyway are not minded.
         lasted.extend(present.iter().filter(|cause| **cause == AMPLIFIER_FAULT && self.phase != DISARMED));
         lasted.sort_unstable();
@@ -220,9 +229,12 @@ impl Oracle {
                     self.enter(if request == RUN { RUNNING } else { HOLDING }, 0);
                 }
             }
-            RUNNING | HOLDING if strongest == Some(Act::Ramp) => self.enter(RAMPING, first(Act::Ramp)),
-            RUNNING if request == RAMP_DOWN => self.enter(RAMPING, first(Act::Hold)),
+            RUNNING | HOLDING | DRIVING if strongest == Some(Act::Ramp) => self.enter(RAMPING, first(Act::Ramp)),
+            RUNNING | DRIVING if request == RAMP_DOWN => self.enter(RAMPING, first(Act::Hold)),
             RUNNING if strongest.is_some() || request == HOLD => self.enter(HOLDING, first(Act::Hold)),
+            DRIVING if strongest.is_some() || request != DRIVE && request != NOTHING => {
+                self.enter(HOLDING, first(Act::Hold));
+            }
             HOLDING => {
                 if self.cause == 0 {
                     self.cause = first(Act::Hold);
@@ -233,6 +245,8 @@ impl Oracle {
                     self.cause = 0;
                 } else if request == RUN && well && (new_request || self.cause == 0) {
                     self.enter(RUNNING, 0);
+                } else if request == DRIVE && well && (new_request || self.cause == 0) {
+                    self.enter(DRIVING, 0);
                 }
             }
             RAMPING => {
@@ -249,7 +263,7 @@ impl Oracle {
     }
 
     fn enter(&mut self, phase: u8, cause: u8) {
-        self.fresh |= phase == ARMING;
+        self.fresh |= phase == ARMING || phase == DRIVING;
         self.phase = phase;
         self.cause = cause;
         self.good = 0;
@@ -263,6 +277,13 @@ impl Oracle {
     /// Whether the law begins with this phase, and anew: armed since it last ran.
     pub fn begins_anew(&mut self, ran: bool) -> bool {
         !ran && self.phase == RUNNING && std::mem::take(&mut self.fresh)
+    }
+
+    /// The pose that the tick has measured is near the end of the workspace. After [`Oracle::observe`].
+    pub fn nears_the_end(&mut self) {
+        if self.phase == DRIVING {
+            self.seen.push(WORKSPACE);
+        }
     }
 
     /// What a tick shows: the gauges' words and values, what the gauges ought to read, how far each axis or leg is from its
@@ -294,13 +315,13 @@ impl Oracle {
                 self.concerned |= 1 << leg;
                 believed = false;
             }
-            if self.phase == RUNNING && status >> leg & 1 == 1 {
+            if matches!(self.phase, RUNNING | DRIVING) && status >> leg & 1 == 1 {
                 let slewed = (codes[1][leg] - codes[0][leg]).abs() >= max_step;
                 self.seen.push(if slewed { 7 } else { 6 });
                 self.concerned |= 1 << leg;
             }
         }
-        if !believed || !matches!(self.phase, ARMING | RUNNING | HOLDING) {
+        if !believed || !matches!(self.phase, ARMING | RUNNING | HOLDING | DRIVING) {
             return;
         }
         let channel = &mut self.channels[turn];
@@ -312,7 +333,9 @@ impl Oracle {
         let least = channel.expected.iter().copied().fold(f64::INFINITY, f64::min);
         let most = channel.expected.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         let tracks = self.phase == RUNNING && errors[turn].abs() > self.bounds.tracking[turn];
-        let present = [most - least > STUCK_MOTION, (readings[turn] - expected[turn]).abs() > DISAGREEMENT, tracks];
+        // Legs of an open drive may not be those of the model.
+        let disagrees = self.phase != DRIVING && (readings[turn] - expected[turn]).abs() > DISAGREEMENT;
+        let present = [most - least > STUCK_MOTION, disagrees, tracks];
         for (kind, (present, cause)) in present.into_iter().zip([3, 4, 5]).enumerate() {
             let count = &mut channel.counts[kind];
             *count = match (present, kind) {

@@ -58,6 +58,8 @@ struct Tick {
     /// Legs that a limit holds back, and by how many codes each would move where the law runs.
     limited: u32,
     moved: [i32; 6],
+    /// Whether the pose is near the end of the workspace.
+    strays: bool,
 }
 
 /// What can be wrong with one gauge, axis or leg.
@@ -70,6 +72,7 @@ enum Wrong {
     Astray,
     Voltage,
     Slew,
+    Stray,
 }
 
 /// A supervisor on a machine of six codes.
@@ -105,22 +108,26 @@ impl Bench {
         let faults = bits(&tick.words, |word| !(GAUGE_RANGE[0]..=GAUGE_RANGE[1]).contains(word));
         let before = *codes;
         let runs = supervisor.phase == Phase::Running;
+        let drives = supervisor.phase == Phase::Driving;
         let step = supervisor.step_to_rest(plan, MAX_STEP);
         for (code, moved) in codes.iter_mut().zip(tick.moved) {
-            *code = if runs { (*code + moved).clamp(0, HIGHEST) } else { toward(*code, plan.rest, step) };
+            *code = if runs || drives { (*code + moved).clamp(0, HIGHEST) } else { toward(*code, plan.rest, step) };
         }
-        if faults == 0 && matches!(supervisor.phase, Phase::Arming | Phase::Running | Phase::Holding) {
+        if faults == 0 && !matches!(supervisor.phase, Phase::Disarmed | Phase::RampingDown | Phase::Faulted) {
             let sample = Sample {
                 word: tick.words[channel],
-                reading: tick.words[channel],
+                reading: if drives { tick.expected[channel] } else { tick.words[channel] },
                 expected: tick.expected[channel],
                 error: runs.then_some(tick.errors[channel]),
             };
             supervisor.look(plan, channel, &sample);
         }
         let moved: [i32; 6] = std::array::from_fn(|leg| codes[leg] - before[leg]);
-        let (limited, moved, most) = if runs { (tick.limited, moved, MAX_STEP) } else { (0, [0; 6], 1) };
+        let (limited, moved, most) = if runs || drives { (tick.limited, moved, MAX_STEP) } else { (0, [0; 6], 1) };
         supervisor.see(faults, limited, &tick.words, &moved, most);
+        if drives && tick.strays {
+            supervisor.see_end_of_workspace();
+        }
         oracle.observe(
             &tick.words.map(f64::to_bits),
             &tick.words,
@@ -130,6 +137,9 @@ impl Bench {
             u64::from(tick.limited),
             i64::from(MAX_STEP),
         );
+        if tick.strays {
+            oracle.nears_the_end();
+        }
         Ok(())
     }
 }
@@ -168,6 +178,7 @@ impl World {
             Wrong::Astray,
             Wrong::Voltage,
             Wrong::Slew,
+            Wrong::Stray,
         ];
         let count = self.choose(&[0, 0, 0, 1, 1, 2, 4]);
         self.wrong = (0..count).map(|_| (self.below(6), self.choose(&kinds))).collect();
@@ -199,9 +210,10 @@ impl World {
         if number % 8 == 0 {
             self.request = match (towards, phase) {
                 (true, DISARMED) => self.choose(&[ARM, NOTHING]),
-                (true, ARMING | HOLDING | RUNNING) => self.choose(&[RUN, RUN, NOTHING]),
+                (true, ARMING | HOLDING | RUNNING) => self.choose(&[RUN, RUN, NOTHING, DRIVE]),
+                (true, DRIVING) => self.choose(&[DRIVE, DRIVE, NOTHING, RUN]),
                 (true, FAULTED) => self.choose(&[ACKNOWLEDGE, NOTHING]),
-                _ => self.choose(&[NOTHING, ARM, RUN, HOLD, RAMP_DOWN, ACKNOWLEDGE, 6, u64::MAX]),
+                _ => self.choose(&[NOTHING, ARM, RUN, HOLD, RAMP_DOWN, ACKNOWLEDGE, DRIVE, 7, u64::MAX]),
             };
         }
         // Each of the readings another word than the last; nothing wrong.
@@ -214,6 +226,7 @@ impl World {
             errors: std::array::from_fn(|axis| bounds.tracking[axis] * (2.0 * self.random.unit() - 1.0)),
             limited: 0,
             moved: std::array::from_fn(|_| self.choose(&[0, 1, -1, 99, -99, 100, -100])),
+            strays: false,
         };
         for (index, wrong) in self.wrong.clone() {
             // Mostly there, or it would never last.
@@ -254,6 +267,7 @@ impl World {
                 tick.limited |= 1 << index;
                 tick.moved[index] = if number % 2 == 0 { MAX_STEP } else { -MAX_STEP };
             }
+            Wrong::Stray => tick.strays = true,
         }
     }
 }
@@ -284,10 +298,10 @@ fn phases_causes_and_conditions_of_random_sequences_are_those_of_the_oracle() {
         Bounds { amplifier: Act::Hold, ..Bounds::legs() },
     ] {
         let met = follow(&bounds, bounds.clone(), 6000).unwrap();
-        for phase in DISARMED..=FAULTED {
+        for phase in DISARMED..=DRIVING {
             assert!(met.iter().any(|(found, _)| *found == phase), "phase {phase} never came");
         }
-        for cause in (0..=13).chain([15, AMPLIFIER_FAULT]) {
+        for cause in (0..=13).chain([15, AMPLIFIER_FAULT, WORKSPACE]) {
             assert!(met.iter().any(|(_, found)| *found == cause), "cause {cause} never came: {met:?}");
         }
         assert!(met.len() > 30, "{met:?}");
@@ -333,6 +347,7 @@ fn a_fault_of_an_amplifier_does_in_its_tick_what_the_spec_says() {
             (Arming, rising, fault),
             (Running, running, fault),
             (Holding, holding, fault),
+            (Driving, holding, fault),
             (RampingDown, falling, fault),
         ] {
             for events in [64, 64 | 32] {
@@ -370,7 +385,7 @@ fn codes_are_held_or_go_to_rest_as_the_phase_says() {
         for ramp_every in [1, 2, 5] {
             let plan = Supervision { ramp_step, ramp_every, ..plan(&Bounds::legs()) };
             let mut supervisor = Supervisor::<f64>::new();
-            for phase in [Phase::Running, Phase::Holding] {
+            for phase in [Phase::Running, Phase::Holding, Phase::Driving] {
                 supervisor.phase = phase;
                 assert_eq!(supervisor.step_to_rest(&plan, max_step), 0, "{phase:?}");
             }

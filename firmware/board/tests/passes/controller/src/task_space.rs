@@ -173,6 +173,9 @@ pub const AFFINE_LOAD: Option<Affine<Real>> = Some(Affine {
     ],
 });
 
+/// E J: cross-talk of the legs, beside the whole kernel, m/m and m/rad; from `actuator.cross_talk`.
+pub const CROSS_TALK: Option<[[Real; 6]; LEGS]> = None;
+
 /// Leg forces under which the gauges were zeroed: gravity at rest, N.
 pub const REST_FORCE: [Real; LEGS] = [
     3.3039389573761375, 3.3039389573761357, 3.3039389573761366, 3.3039389573761433, 3.3039389573761424,
