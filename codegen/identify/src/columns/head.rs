@@ -235,15 +235,14 @@ impl Head {
         self.next += usize::from(lines.get(self.next).is_some_and(|(_, line)| is_rule(line)));
     }
 
-    /// Appends the units in a line to the names without one; `Increment` has the interval of a counted time.
+    /// Appends the units in a line to the names without them; `Increment` has the interval of a counted time.
     fn add_units(&mut self, line: &[u8]) {
         for (name, unit) in self.names.iter_mut().zip(names_of(line)) {
             if is_increment(name) {
                 self.interval = self.interval.or_else(|| unit.parse().ok().filter(is_interval));
             }
-            if names::is_unit(&unit) && !names::has_unit(name) {
-                *name = format!("{name} [{}]", unit.trim_matches(['[', ']', '(', ')']));
-            }
+            // A name whose own unit is another one then fits no quantity.
+            *name = names::with_unit(name, unit.trim_matches(['[', ']', '(', ')']));
         }
     }
 

@@ -48,6 +48,14 @@ pub(super) fn find(header: &Head, wanted: &[ColumnSpec], reading: &Reading, find
         let message = format!("column `{name}` is missing; {}", search.present());
         findings.add(codes::RECORD_HEADER, line, message, &search.help(name, suggested.as_deref()));
     }
+    let found: Vec<&Column> = columns.iter().flatten().collect();
+    let twice = found.iter().enumerate().find_map(|(k, column)| {
+        found[..k].iter().find(|other| other.at == column.at).map(|other| (other.name, column.name, column.at + 1))
+    });
+    if let Some((first, second, at)) = twice {
+        let message = format!("column {at} is named for `{first}` and for `{second}`");
+        findings.add(codes::RECORD_COLUMN_TWICE, line, message, "name another column for one of them in `--columns`");
+    }
     if findings.any_error() { None } else { Some(Places { columns, interval }) }
 }
 

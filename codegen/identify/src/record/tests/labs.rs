@@ -207,6 +207,34 @@ fn the_data_table_of_a_text_is_found() {
 }
 
 /// A note names a few lines; more would be half a record.
+/// A line of units that contradicts a name is not left out: which of them is right is not known.
+#[test]
+fn a_line_of_units_that_contradicts_a_name_is_refused() {
+    let with = |units: &str| {
+        let rows = file("time_s,drive_V,displacement_um", |[t, u, y]| format!("{t:?},{u:?},{y:?}"));
+        rows.replacen('\n', &format!("\n{units}\n"), 1)
+    };
+    for units in ["s,V,um", "[s],[V],[um]", "(s),(V),(µm)"] {
+        assert_same(units, read(with(units).as_bytes(), &[], None));
+    }
+    for (units, named) in
+        [("s,V,nm", "displacement_um [nm]"), ("[s],[mV],[um]", "drive_V [mV]"), ("ms,V,um", "time_s [ms]")]
+    {
+        let found = read(with(units).as_bytes(), &[], None).map(|record| record.warnings).unwrap_err();
+        assert!(found[0].message.contains(named), "{units}: {found:?}");
+    }
+}
+
+#[test]
+fn one_column_is_not_two_quantities() {
+    let rows = file("time_s,CH,CH", |[t, u, y]| format!("{t:?},{u:?},{y:?}"));
+    for columns in ["drive_V=CH,displacement_um=CH", "drive_V=2,displacement_um=2"] {
+        let found = read(rows.as_bytes(), &[columns], None).map(|record| record.warnings).unwrap_err();
+        assert!(found[0].code == "E0505" && found[0].message.contains("column 2 is named for"), "{found:?}");
+    }
+    assert_same("by number", read(rows.as_bytes(), &["drive_V=2,displacement_um=3"], None));
+}
+
 #[test]
 fn rows_behind_a_text_are_named() {
     let data = file("time_s,drive_V,displacement_um", |[t, u, y]| format!("{t},{u},{y}"));
