@@ -78,8 +78,8 @@ pub fn of_records(records: &[(String, String); 6]) -> Result<CrossTalk, Vec<Diag
             *entry = if i == j { 0.0 } else { inverse[(i, j)] / inverse[(i, i)] };
         }
     }
-    // The comparison refuses a NaN, too.
     let alike = (0..36).any(|k| k % 7 != 0 && responses[(k / 6, k % 6)].abs() > MOST);
+    // Written so that a NaN is refused.
     if alike || !found.matrix.iter().flatten().all(|entry| entry.abs() <= MOST) {
         let mut findings = Findings::new(&records[0].0);
         let message = format!("another leg moves by more than {MOST} of the leg that is driven");
