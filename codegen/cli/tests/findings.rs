@@ -130,7 +130,8 @@ fn outcome(page: &str, is_fixed: bool, known: &Known) -> Option<Outcome> {
     let commands = if is_fixed && !new_commands.is_empty() { new_commands } else { commands };
     let script = commands.first().map_or_else(
         || format!("specgen check {}", checked.unwrap_or_else(|| panic!("no spec"))),
-        |block| block.lines.join("\n"),
+        // A command that goes on in the next line is one.
+        |block| block.lines.join("\n").replace("\\\n", ""),
     );
     if let Some(outcome) = known.lock().unwrap().get(&script).filter(|_| !is_changed) {
         return Some(outcome.clone());

@@ -40,6 +40,28 @@ fn span(model: &Model, pose: &Pose) -> [f64; 2] {
     [all.iter().copied().fold(f64::INFINITY, f64::min), all.iter().copied().fold(f64::NEG_INFINITY, f64::max)]
 }
 
+/// Legs extend by (I + E) l. What rests, the bias and every declared path need is compared with lengths by Pythagoras.
+#[test]
+fn cross_talk_counts_as_travel() {
+    let (mut model, task) = reference("reference.toml");
+    let mut random = ChaCha8Rng::seed_from_u64(3);
+    let bias = task.setpoint.bias;
+    for _ in 0..8 {
+        let mut entry = || f64::from(random.next_u32()) / f64::from(u32::MAX) * 0.04 - 0.02;
+        let e: [[f64; 6]; 6] = std::array::from_fn(|i| std::array::from_fn(|j| if i == j { 0.0 } else { entry() }));
+        model.actuator.cross_talk = Some(e);
+        let platform = lower::platform(&model).unwrap();
+        let reach = reach::measure(&model, &platform, model.actuator.stroke, &bias);
+        let l = displacements(&model, &bias);
+        let extended = (0..6).map(|i| l[i] + (0..6).map(|j| e[i][j] * l[j]).sum::<f64>());
+        let [low, high] = extended.fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], x| [a.min(x), b.max(x)]);
+        assert!((reach.at_bias[0] - low).abs() < 1e-14 && (reach.at_bias[1] - high).abs() < 1e-14, "{reach:?}");
+        assert!(reach.demanded_bound >= reach.demanded[1], "{reach:?}");
+        let plain = span(&model, &bias);
+        assert!((plain[1] - high).abs() > 1e-9, "E changes nothing here: {plain:?}");
+    }
+}
+
 fn bounds(model: &Model) -> Pose {
     let ([x, y, z], [a, b, c]) = (model.workspace.translation, model.workspace.rotation);
     [x, y, z, a, b, c]

@@ -21,6 +21,7 @@ use specgen_language::model::{Model, TaskSpace};
 pub use boxes::Boxes;
 pub use conditioning::Conditioning;
 pub use findings::describe;
+pub(crate) use travel::coupled;
 
 /// Interior poses that are checked in addition to the corners.
 const INTERIOR_POSES: u32 = 128;
@@ -88,7 +89,7 @@ pub fn check(
 ) -> Result<(Reach, Vec<Diagnostic>), Vec<Diagnostic>> {
     let bias = task.setpoint.bias;
     let reach = measure(model, platform, stroke, &bias);
-    let legs = travel::Legs { platform, stroke };
+    let legs = travel::Legs::of(model, platform, stroke);
     let found = findings::of(model, &reach, &legs.shift(core::iter::once(bias)));
     if found.iter().any(|one| one.severity == specgen_language::diagnostic::Severity::Error) {
         return Err(found);
@@ -118,7 +119,7 @@ pub fn check_legs(
 #[must_use]
 pub fn check_bounds(model: &Model) -> Vec<Diagnostic> {
     let Ok(platform) = crate::lower::platform(model) else { return Vec::new() };
-    let legs = travel::Legs { platform: &platform, stroke: model.actuator.stroke };
+    let legs = travel::Legs::of(model, &platform, model.actuator.stroke);
     let middle = legs.middle();
     findings::of_bounds(model, legs.stroke, |axis| [-1.0, 1.0].map(|sign| legs.travel(&middle, axis, sign)))
 }
@@ -133,7 +134,7 @@ pub fn notes(model: &Model, reach: &Reach) -> Vec<Diagnostic> {
 #[must_use]
 pub fn measure(model: &Model, platform: &Platform<f64>, stroke: f64, bias: &Pose) -> Reach {
     let bounds = model.workspace.bounds();
-    let legs = travel::Legs { platform, stroke };
+    let legs = travel::Legs::of(model, platform, stroke);
     let lengths = model.geometry.rest_legs().map(|[x, y, z]| libm::sqrt(x * x + y * y + z * z));
     let middle = legs.middle();
     let from = |pose: &Pose, axis: usize| [legs.travel(pose, axis, -1.0), legs.travel(pose, axis, 1.0)];
@@ -171,7 +172,7 @@ pub fn check_poses(
     [key, name]: [&str; 2],
     poses: impl Iterator<Item = Pose>,
 ) -> Result<PathReach, Vec<Diagnostic>> {
-    let legs = travel::Legs { platform, stroke };
+    let legs = travel::Legs::of(model, platform, stroke);
     let path = legs.shift(poses);
     match findings::of_path(model, stroke, [key, name], &path) {
         None => Ok(path),

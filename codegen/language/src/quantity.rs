@@ -5,7 +5,7 @@
 //! unit     = product {"/" factor}     product = factor {[" "|"*"|"·"|"-"] factor}
 //! factor   = (name | "(" unit ")") [["^"|"**"] power]
 //! ```
-//! Conversion to SI rounds once, to the nearest double. A name that is not a symbol may have several meanings ([`names`]):
+//! Conversion to SI rounds once, to the nearest double. A name that is not a symbol may have several meanings (module `names`):
 //! [`parse`] takes the surest one, [`parse_as`] the one that gives the wanted dimension.
 
 mod decimal;

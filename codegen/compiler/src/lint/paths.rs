@@ -8,6 +8,7 @@ use specgen_runtime::Platform;
 
 use super::{Findings, Legs, figure};
 use crate::lower::setpoint::Stretch;
+use crate::reach::coupled;
 use specgen_language::diagnostic::Diagnostic;
 use specgen_language::model::{Model, TaskSpace};
 
@@ -248,7 +249,10 @@ fn look(
     stretch: &Stretch,
 ) {
     let dt = stretch.interval;
-    let legs: Vec<[f64; 6]> = stretch.poses.iter().map(|pose| displacements(platform, pose)).collect();
+    let legs: Vec<[f64; 6]> = {
+        let of = |pose| coupled(model.actuator.cross_talk.as_ref(), displacements(platform, pose));
+        stretch.poses.iter().map(of).collect()
+    };
     for pair in legs.windows(2) {
         for leg in 0..6 {
             larger(&mut demand.leg_speed, (pair[1][leg] - pair[0][leg]).abs() / dt);

@@ -1,7 +1,6 @@
 //! The largest boxes of reachable poses about the middle of the strokes.
 
 use serde::Serialize;
-use specgen_numerics::jacobian;
 
 use super::Pose;
 use super::travel::Legs;
@@ -24,7 +23,7 @@ pub struct Boxes {
 
 impl Boxes {
     pub(super) fn of(legs: &Legs<'_>, centre: Pose, declared: &Pose) -> Self {
-        let slopes = jacobian(legs.platform, &centre).map(|row| row.map(f64::abs));
+        let slopes = legs.slopes(&centre).map(|row| row.map(f64::abs));
         // Linear legs would reach `half`; the exact corners reach a share of it.
         let fitted = |half: Pose| {
             let share = legs.corners_within(&centre, &half);

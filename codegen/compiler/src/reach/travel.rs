@@ -1,6 +1,7 @@
 //! Leg displacements along axes, over boxes and along paths, from the kinematics that the controller uses.
 
 use nalgebra::{Matrix6, Vector6};
+use specgen_language::model::Model;
 use specgen_numerics::{displacements, jacobian, largest};
 use specgen_runtime::Platform;
 
@@ -11,15 +12,39 @@ const LARGEST_ANGLE: f64 = core::f64::consts::FRAC_PI_4;
 /// Tolerance of the stroke, as a share of it: rounding must not refuse a path that starts at rest.
 const SLACK: f64 = 1e-9;
 
+/// Displacements of the legs with their cross-talk E: (I + E) l. E has rows by leg, m/m; m in and out.
+pub(crate) fn coupled(cross_talk: Option<&[[f64; 6]; 6]>, l: [f64; 6]) -> [f64; 6] {
+    let Some(e) = cross_talk else { return l };
+    core::array::from_fn(|leg| e[leg].iter().zip(&l).fold(l[leg], |sum, (e, l)| sum + e * l))
+}
+
 pub(super) struct Legs<'a> {
     pub(super) platform: &'a Platform<f64>,
     pub(super) stroke: f64,
+    pub(super) cross_talk: Option<&'a [[f64; 6]; 6]>,
 }
 
-impl Legs<'_> {
+impl<'a> Legs<'a> {
+    pub(super) const fn of(model: &'a Model, platform: &'a Platform<f64>, stroke: f64) -> Self {
+        Self { platform, stroke, cross_talk: model.actuator.cross_talk.as_ref() }
+    }
+
+    /// What each leg must extend by at a pose, cross-talk included, m.
+    fn displacements(&self, pose: &Pose) -> [f64; 6] {
+        coupled(self.cross_talk, displacements(self.platform, pose))
+    }
+
+    /// Slopes of these displacements, a row by leg, m/m and m/rad.
+    pub(super) fn slopes(&self, pose: &Pose) -> [[f64; 6]; 6] {
+        let rows = jacobian(self.platform, pose);
+        let columns: [[f64; 6]; 6] =
+            core::array::from_fn(|axis| coupled(self.cross_talk, core::array::from_fn(|leg| rows[leg][axis])));
+        core::array::from_fn(|leg| core::array::from_fn(|axis| columns[axis][leg]))
+    }
+
     /// Smallest and largest leg displacement at a pose, m.
     pub(super) fn span(&self, pose: &Pose) -> [f64; 2] {
-        displacements(self.platform, pose).iter().map(|x| [*x, *x]).fold([f64::INFINITY, f64::NEG_INFINITY], wider)
+        self.displacements(pose).iter().map(|x| [*x, *x]).fold([f64::INFINITY, f64::NEG_INFINITY], wider)
     }
 
     fn holds(&self, pose: &Pose) -> bool {
@@ -31,8 +56,8 @@ impl Legs<'_> {
     pub(super) fn middle(&self) -> Pose {
         let mut pose = [0.0; 6];
         for _ in 0..8 {
-            let missing = displacements(self.platform, &pose).map(|x| 0.5 * self.stroke - x);
-            let slopes = jacobian(self.platform, &pose);
+            let missing = self.displacements(&pose).map(|x| 0.5 * self.stroke - x);
+            let slopes = self.slopes(&pose);
             let rows = Matrix6::from_fn(|i, j| slopes[i][j]);
             let Some(step) = rows.lu().solve(&Vector6::from(missing)) else {
                 break;
@@ -53,7 +78,7 @@ impl Legs<'_> {
             moved
         };
         // An upper bound of the travel: the stroke over the steepest slope, doubled for the curvature.
-        let slopes = jacobian(self.platform, pose);
+        let slopes = self.slopes(pose);
         let steepest = slopes.iter().map(|row| row[axis].abs()).fold(0.0, |a: f64, b| if b > a { b } else { a });
         let far = 2.0 * self.stroke / steepest;
         let far = if axis >= 3 && far > LARGEST_ANGLE { LARGEST_ANGLE } else { far };
@@ -83,15 +108,18 @@ impl Legs<'_> {
         let turn = bounds[3] + bounds[4] + bounds[5];
         let second = (libm::exp(turn) - 1.0 - turn) * joint_radius;
         let motion = bounds[0] + bounds[1] + bounds[2] + turn * joint_radius + second;
-        let slopes = jacobian(self.platform, &[0.0; 6]);
+        let slopes = self.slopes(&[0.0; 6]);
+        let nonlinear = rest_lengths.map(|length| {
+            second + if motion < length { motion * motion / (2.0 * (length - motion)) } else { motion }
+        });
+        let magnitudes = self.cross_talk.map(|e| e.map(|row| row.map(f64::abs)));
         let mut largest = 0.0;
-        for (row, length) in slopes.iter().zip(rest_lengths) {
+        for (row, nonlinear) in slopes.iter().zip(coupled(magnitudes.as_ref(), nonlinear)) {
             let mut linear = 0.0;
             for (slope, bound) in row.iter().zip(bounds) {
                 linear += slope.abs() * bound;
             }
-            let curvature = if motion < *length { motion * motion / (2.0 * (length - motion)) } else { motion };
-            let all = linear + second + curvature;
+            let all = linear + nonlinear;
             if all > largest {
                 largest = all;
             }
@@ -103,11 +131,11 @@ impl Legs<'_> {
     /// over the strokes of a piezo they do not change.
     pub(super) fn shift(&self, poses: impl Iterator<Item = Pose>) -> PathReach {
         let mut path = PathReach { poses: 0, displacement: [f64::INFINITY, f64::NEG_INFINITY], shift: None };
-        let slopes = jacobian(self.platform, &[0.0; 6]).map(|row| row[2]);
+        let slopes = self.slopes(&[0.0; 6]).map(|row| row[2]);
         let (mut lowest, mut highest) = (f64::NEG_INFINITY, f64::INFINITY);
         for pose in poses {
             path.poses += 1;
-            for (x, slope) in displacements(self.platform, &pose).iter().zip(slopes) {
+            for (x, slope) in self.displacements(&pose).iter().zip(slopes) {
                 // NaN counts as beyond every stroke.
                 path.displacement =
                     if x.is_nan() { [f64::NEG_INFINITY, f64::INFINITY] } else { wider(path.displacement, [*x, *x]) };

@@ -10,6 +10,7 @@ use specgen_runtime::setpoint::StopLimits;
 use super::poses::{Stretch, along};
 use super::{AXES, User, amount, stop};
 use crate::ir::Setpoints;
+use crate::reach::coupled;
 use specgen_language::diagnostic::Diagnostic;
 use specgen_language::model::{Model, TaskSpace};
 use specgen_numerics::largest;
@@ -80,7 +81,7 @@ pub fn check(
     let declared = stop::Limits::of(model, task, &user);
     let period = model.timing.period;
     let conditions = Conditions { limits: declared.reciprocal(period), period, lag: model.amplifier.lag };
-    let place = Place { user: &user, platform, stroke };
+    let place = Place { user: &user, platform, stroke, cross_talk: model.actuator.cross_talk.as_ref() };
     let mut findings = Vec::new();
     let mut stops = Vec::new();
     let rules = &task.setpoint;
@@ -153,6 +154,7 @@ struct Place<'a> {
     user: &'a User,
     platform: &'a Platform<f64>,
     stroke: f64,
+    cross_talk: Option<&'a [[f64; 6]; 6]>,
 }
 
 impl Place<'_> {
@@ -161,7 +163,8 @@ impl Place<'_> {
         let Some(there) = self.user.pose(pose) else { return false };
         let inside = there.iter().zip(&self.user.bound).all(|(value, bound)| value.abs() <= (1.0 + slack) * bound);
         let [low, high] = [-slack * self.stroke, (1.0 + slack) * self.stroke];
-        inside && displacements(self.platform, &there).iter().all(|leg| *leg >= low && *leg <= high)
+        let legs = coupled(self.cross_talk, displacements(self.platform, &there));
+        inside && legs.iter().all(|leg| *leg >= low && *leg <= high)
     }
 
     /// Room of the user's axis alone from the bias pose in its better direction, m or rad; 0 if it is only rounding.

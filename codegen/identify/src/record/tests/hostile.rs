@@ -200,7 +200,18 @@ fn a_million_columns_are_refused() {
     assert!(!refusal(format!("{}\n1\n", names.join(",")).as_bytes(), 1 << 31).help.is_empty());
 }
 
-/// Wherever a file ends: a record only if it is the whole one.
+/// Where the segments of a TDMS file end.
+fn ends_of_segments(file: &[u8]) -> Vec<usize> {
+    let mut ends = vec![0];
+    while let Some(head) = ends.last().and_then(|at| file.get(*at..)?.get(..28)) {
+        let length = u64::from_le_bytes(head[12..20].try_into().unwrap());
+        ends.push(ends.last().unwrap() + 28 + length as usize);
+    }
+    ends
+}
+
+/// Wherever a file ends: a record only if it is the whole one. A TDMS file that ends with a segment is whole: the program that
+/// wrote it appends segments.
 #[test]
 fn files_that_end_at_any_byte_are_never_half_a_record() {
     for name in ["v5.mat", "v5-plain.mat", "v7.3.mat", "record.h5", "record.tdms"] {
@@ -209,6 +220,10 @@ fn files_that_end_at_any_byte_are_never_half_a_record() {
         let step = if std::env::var_os("SPECGEN_FULL").is_some() { 1 } else { 7 };
         for end in (20..whole.len()).step_by(step) {
             if let Ok(part) = read_as(&whole[..end], &Reading::default()) {
+                if name == "record.tdms" && ends_of_segments(&whole).contains(&end) {
+                    assert!(record.time.starts_with(&part.time) && record.displacement.starts_with(&part.displacement));
+                    continue;
+                }
                 assert!(part.time == record.time && part.displacement == record.displacement, "{name}: {end} bytes");
             }
         }
