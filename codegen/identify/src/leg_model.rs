@@ -13,8 +13,7 @@
 //! If there is a record that no fit used, the simplest family whose error on it is within a tenth of the least, plus a
 //! fifth of the noise, is chosen. Otherwise families are compared by cross-validation: whole curves are held out, in
 //! folds. The simplest family within one standard error of the best is chosen. A family with plays or a Bouc-Wen state may
-//! also be worse by a tenth of the least error plus a fifth of the noise; it gets creep if that is better by one standard
-//! error.
+//! also be worse by a tenth of the least error plus a fifth of the noise.
 
 mod families;
 mod family;

@@ -1,22 +1,24 @@
 //! Steps and a path prepared by the leg model of a spec, hysteresis included, on machines of three classes of legs. The model is
-//! chosen from noisy reversal curves of each leg; the machine is the plant that gave them. All of it is simulation.
+//! chosen from noisy reversal curves of each leg at two rates; the machine is the plant that gave them. At one rate creep and
+//! rate dependence look alike (W0649), and case 1 keeps 15.8 nm with plays. All of it is simulation.
 
 use host_sim::platform::{PlatformParameters, Specimen};
 use specgen_tests::{leg_class, length};
 
-use super::bench::Bench;
+use super::bench::{Bench, two_rates};
 use super::learning::{STEPS, case_1_errors, learning, settled};
 
 /// What the steps may take in repeated passes, ms.
 const SETTLED: [f64; 2] = [7.0, 14.0];
 /// Name of each class, and what case 1 at 10 Hz may leave in the first pass, nm.
-const CLASSES: [(&str, f64); 3] = [("plays", 14.0), ("Bouc-Wen", 15.0), ("rate-widened plays", 33.0)];
+const CLASSES: [(&str, f64); 3] = [("plays", 14.0), ("Bouc-Wen", 15.0), ("rate-widened plays", 14.0)];
 
 /// A machine of legs of a class, and a damped controller with the model of their own records.
 fn bench(class: usize) -> Bench {
     let legs = Specimen::within_tolerances(&PlatformParameters::reference(), &leg_class(class as u64), 1);
     let model = ("memory  = 64", "memory  = 64\nmodel   = \"auto\"");
-    Bench::new(&format!("prepared-{class}"), legs, &[&learning()[..], &[model]].concat())
+    let records = two_rates(&legs.legs);
+    Bench::with_records(&format!("prepared-{class}"), legs, &records, &[&learning()[..], &[model]].concat())
 }
 
 #[test]
@@ -35,8 +37,7 @@ fn steps_and_a_path_are_prepared_by_the_whole_leg_model() {
                 size * 1e6,
                 time * 1e3
             );
-            // No leg model widens with the rate: 1 µm takes 8.9 ms in the first pass, where 7 are wanted.
-            assert!(again <= most && first <= if class < 2 { most } else { most + 3.0 }, "{name}: {first} {again}");
+            assert!(again <= most && first <= most, "{name}: {first} {again}");
         }
     }
 }

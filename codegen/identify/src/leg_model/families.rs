@@ -106,17 +106,6 @@ struct Candidate {
     fitted: Option<(bool, Shape)>,
 }
 
-impl Candidate {
-    /// Whether this is `simpler` with creep, and better by more than one standard error. Held-out curves are scored without
-    /// their means, which hides most of the creep: [`WORTHWHILE`] would drop creep that shows in motion.
-    fn adds_creep_to(&self, simpler: &Self) -> bool {
-        let gains = simpler.squares.iter().zip(&self.squares).map(|(a, b)| a.sqrt() - b.sqrt());
-        let (gain, error) = mean_and_error(&gains.collect::<Vec<_>>());
-        let pair = !simpler.family.creep && self.family == Family { creep: true, ..simpler.family };
-        pair && simpler.family.kind != Kind::Preisach && gain > error
-    }
-}
-
 fn chosen(
     (record, arbitrary): (&Record, Option<&Selection<'_>>),
     options: &crate::Options,
@@ -186,8 +175,7 @@ fn chosen(
             Some(least) => arbitrary_rms.is_some_and(|rms| rms <= (1.0 + WORTHWHILE[0]) * least + noise),
             None => excess <= error || excess <= slack,
         };
-        let adds_creep = least.is_none() && chosen.as_ref().is_some_and(|chosen| candidate.adds_creep_to(chosen));
-        if adds_creep || chosen.is_none() && good {
+        if chosen.is_none() && good {
             chosen = Some(candidate);
         }
     }

@@ -188,8 +188,8 @@ fn families(choice: &Choice, grid: usize, arbitrary: Option<&str>) -> String {
             let _ = writeln!(text, "  chosen: the simplest within a tenth of the least error on {name}");
         }
         None => {
-            text += "  chosen: the simplest within a tenth of the best plus a fifth of the noise (a\n  \
-                     table: within one std err), with creep if that is better by one std err\n";
+            text += "  chosen: the simplest within a tenth of the best plus a fifth of the noise; a\n  \
+                     table has to be within one standard error\n";
         }
     }
     text += "  instructions of one leg on a Cortex-M7 in f64 are estimated, not measured\n";
