@@ -109,9 +109,8 @@ impl<'a> Legs<'a> {
         let second = (libm::exp(turn) - 1.0 - turn) * joint_radius;
         let motion = bounds[0] + bounds[1] + bounds[2] + turn * joint_radius + second;
         let slopes = self.slopes(&[0.0; 6]);
-        let nonlinear = rest_lengths.map(|length| {
-            second + if motion < length { motion * motion / (2.0 * (length - motion)) } else { motion }
-        });
+        let nonlinear = rest_lengths
+            .map(|length| second + if motion < length { motion * motion / (2.0 * (length - motion)) } else { motion });
         let magnitudes = self.cross_talk.map(|e| e.map(|row| row.map(f64::abs)));
         let mut largest = 0.0;
         for (row, nonlinear) in slopes.iter().zip(coupled(magnitudes.as_ref(), nonlinear)) {

@@ -3,7 +3,9 @@
 use crate::common::worse;
 use specgen_runtime::Motion;
 use specgen_runtime::setpoint::{MoveLimits, Parallel, Setpoints, StopLimits};
-use specgen_runtime::wave::{AxisWave, LARGEST, Limits, Refusal, Settings, Shape, Stage, TONES, Tone, WORDS, Wave, step_of};
+use specgen_runtime::wave::{
+    AxisWave, LARGEST, Limits, Refusal, Settings, Shape, Stage, TONES, Tone, WORDS, Wave, step_of,
+};
 
 const PERIOD: f64 = 1e-4;
 
