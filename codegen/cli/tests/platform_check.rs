@@ -153,3 +153,58 @@ fn warnings_are_denied_unless_the_spec_says_why() {
         folder.run(&["check", "bad.toml", "--deny-warnings"]).says(1, &[code]);
     }
 }
+
+/// Legs that are not identified: what the other values tell is shown, and what needs a record says so.
+#[test]
+fn a_platform_whose_legs_are_not_identified_has_the_open_drive_only() {
+    const RECORD: &str = "records = [\"records/reference-forc.csv\"]";
+    let (folder, text) = folder("reference.toml");
+    let open = text.replace(RECORD, "records = []");
+    assert_ne!(open, text);
+    folder.write("open.toml", &open);
+    let document = folder.json(&["check", "open.toml"]);
+    assert_eq!(document.code, 0);
+    let found: Vec<&str> = document.findings().iter().filter_map(|one| one["key"].as_str()).collect();
+    assert_eq!(found.iter().filter(|key| **key == "hysteresis.records").count(), 1, "{found:?}");
+    assert_eq!(document.value["result"]["verdict"]["assumed"]["unidentified"], true);
+    let run = folder.run(&["check", "open.toml", "--details"]);
+    run.says(0, &["W0652", "open drive only", "specgen commission"]);
+    assert!(run.stdout.contains("unidentified legs") && run.stdout.contains("wiring check: a pulse"), "{run:#?}");
+    folder.run(&["check", "open.toml", "--deny-warnings"]).says(1, &["W0652"]);
+    let recorded = ["sim", "open.toml", "--record", "run.rec", "--seconds", "0.1"];
+    folder.run(&recorded).says(1, &["holding: legs not identified instead of running"]);
+    let predicted = ["identify", "predict", "open.toml", "records/reference-forc.csv"];
+    folder.run(&predicted).says(2, &["no leg is identified"]);
+    for refined in ["gains", "refit"] {
+        let line = ["identify", refined, "records/reference-forc.csv", "--spec", "open.toml"];
+        folder.run(&line).says(1, &["no leg of the spec is identified"]);
+    }
+    let run = folder.run(&["build", "open.toml", "--no-build", "-o", "out"]);
+    assert!(run.code == 0 && run.stdout.contains("unidentified legs"), "{run:#?}");
+    let lib = folder.read("out/controller/src/lib.rs");
+    assert!(lib.contains("controller!(platform, open_drive);"));
+    // A law that no machine runs is simulated, tuned and learned with the straight line.
+    let some: &[&str] = &[
+        "sim open.toml --trajectory case-1",
+        "robust open.toml --draws 1",
+        "tune open.toml --evaluations 8 --seconds 0.1",
+        "learn open.toml --trajectory case-1 --passes 1",
+        "report open.toml --no-target -o page.html",
+        "design open.toml",
+        "dynamics open.toml",
+        "forc open.toml --drive-only -o drive.csv",
+        "export c open.toml -o c",
+    ];
+    for line in &some[..length(1, some.len())] {
+        let run = folder.line(line);
+        assert_eq!(run.code, 0, "{line}: {run:#?}");
+        assert!(!line.starts_with("sim") || run.stdout.contains("a straight line for each leg"), "{run:#?}");
+    }
+    // Six legs with their own gauges have no open drive, nor cross-talk.
+    folder.spec("six.toml", &[(RECORD, "records = []")]);
+    folder.run(&["check", "six.toml"]).says(1, &["E0304", "no open drive"]);
+    let row = "[0, 0, 0, 0, 0, 0]";
+    let line = format!("cross_talk = [{row}, {row}, {row}, {row}, {row}, {row}]\n[amplifier]\n");
+    folder.spec("six.toml", &[("[amplifier]\n", &line)]);
+    folder.run(&["check", "six.toml"]).says(1, &["E0316", "actuator.cross_talk", "six.toml:"]);
+}

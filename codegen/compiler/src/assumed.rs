@@ -12,6 +12,10 @@ pub struct Assumptions {
     pub values: Vec<String>,
     /// Files of the spec's `[hysteresis]` that are marked as simulated.
     pub simulated: Vec<String>,
+    /// The legs are not identified, and each is taken as a straight line. A real machine needs no consent for that: its law
+    /// does not run.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub unidentified: bool,
 }
 
 /// The section that counts as assumed if a platform's spec lacks it.
@@ -26,10 +30,10 @@ impl Assumptions {
         if model.task_space.is_some() && !model.structure.given {
             values.push(STRUCTURE.to_owned());
         }
-        Self { values, simulated }
+        Self { values, simulated, unidentified: !model.hysteresis.is_identified() }
     }
 
-    /// Whether every value is measured or known.
+    /// Whether every value is measured or known; those of legs that are not identified do not count.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.values.is_empty() && self.simulated.is_empty()
@@ -41,9 +45,12 @@ impl Assumptions {
         counted(&self.values, |count| format!("{count} assumed values"), "1 assumed value")
     }
 
-    /// The records, such as `simulated leg record`; none if there are none.
+    /// The records, such as `simulated leg record`; none if all are measured.
     #[must_use]
     pub fn records(&self) -> Option<String> {
+        if self.unidentified {
+            return Some("unidentified legs".to_owned());
+        }
         counted(&self.simulated, |count| format!("{count} simulated leg records"), "simulated leg record")
     }
 
@@ -101,6 +108,7 @@ mod tests {
         let of = |values: usize, records: usize| Assumptions {
             values: vec!["sensor.noise".to_owned(); values],
             simulated: vec!["leg.csv".to_owned(); records],
+            unidentified: false,
         };
         for (values, records, expected) in [
             (13, 1, "13 assumed values, simulated leg record"),
@@ -111,5 +119,8 @@ mod tests {
             assert_eq!(of(values, records).summary(), expected);
             assert_eq!(of(values, records).is_empty(), expected.is_empty());
         }
+        let unidentified = Assumptions { unidentified: true, ..of(1, 0) };
+        assert_eq!(unidentified.summary(), "1 assumed value, unidentified legs");
+        assert_eq!(unidentified.list(), ["sensor.noise"], "a real machine takes it");
     }
 }

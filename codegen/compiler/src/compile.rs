@@ -101,7 +101,8 @@ fn run_phases(source: &SpecSource, findings: &mut Vec<Diagnostic>) -> Option<Com
     let records = accept(declared::records(&model, &source.dir), findings);
     let setpoints = accept(setpoint::declared(&model, &source.dir), findings);
     let converters = accept(requirements::check(&model), findings);
-    let ((margins, design), records, setpoints, ()) = (stability?, records?, setpoints?, converters?);
+    let ((margins, design), mut records, setpoints, ()) = (stability?, records?, setpoints?, converters?);
+    records.complete(&model);
     // A spec without `hysteresis.grid` takes that of its records.
     model.hysteresis.grid = records.grid(model.hysteresis.grid);
     findings.extend(records.warnings);

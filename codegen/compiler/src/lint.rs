@@ -27,6 +27,7 @@ mod allow;
 mod bodies;
 mod budget;
 mod contact;
+mod cross_talk;
 mod culprit;
 mod electronics;
 mod factors;
@@ -74,7 +75,7 @@ macro_rules! families {
 // In the order in which they run: a rule may read the findings of earlier ones. The last three have no rule.
 families! {
     layout order frames pairs bodies actuator electronics gauges gauge_places gauge_pattern gauge_layout alike contact
-    weights timing tick motion triggers requirements factors budget allow culprit paths
+    cross_talk weights timing tick motion triggers requirements factors budget allow culprit paths
 }
 
 /// A value this many times beyond its threshold is an error. Where a value enters as its square root, as a stiffness does in a

@@ -221,5 +221,6 @@ fn hysteresis(
         table_of_leg,
         rate: rate::lower(model, tables, rate_tables, around, scalar),
         lead: rate::lead(model, tables, around, scalar),
+        identified: model.hysteresis.is_identified(),
     }
 }

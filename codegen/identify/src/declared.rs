@@ -9,7 +9,7 @@ use crate::rate::period::{INVERTED, Invertible};
 use crate::rate::{CreepTerm, Inertia, RateModel};
 use crate::{Options, Report, is_simulated, is_table_csv, parse_record, rate, read_file, read_leg_csv};
 use specgen_language::diagnostic::{Code, Diagnostic, Place, codes};
-use specgen_language::model::{Hysteresis, MAX_GRID, Mcu, Model, RateDependence, Scalar};
+use specgen_language::model::{Actuator, Hysteresis, MAX_GRID, Mcu, Model, RateDependence, Scalar};
 use specgen_language::spec::LegLines;
 
 /// Largest ratio of a record's displacement to that of stack gain and voltage: creep and a rough data sheet explain
@@ -85,6 +85,16 @@ fn finest(model: &Model) -> usize {
 }
 
 impl SpecRecords {
+    /// A straight line in place of the records, if the legs of `model` are not identified.
+    pub fn complete(&mut self, model: &Model) {
+        if !model.hysteresis.is_identified() {
+            let (grid, Actuator { voltage, stroke, .. }) = (model.hysteresis.grid, &model.actuator);
+            self.tables.push(EverettTable::straight(grid, *voltage, *stroke));
+            self.around.push(None);
+            self.warnings.push(not_identified(model));
+        }
+    }
+
     /// N of its tables, `least` if there is none.
     #[must_use]
     pub fn grid(&self, least: usize) -> usize {
@@ -313,6 +323,20 @@ fn about_voltage(mut findings: Vec<Diagnostic>) -> Vec<Diagnostic> {
         }
     }
     findings
+}
+
+fn not_identified(model: &Model) -> Diagnostic {
+    let Actuator { stroke, voltage: [low, high], .. } = model.actuator;
+    Diagnostic::at(
+        &model.spans,
+        &["hysteresis.records"],
+        codes::NOT_IDENTIFIED,
+        format!(
+            "no leg is identified: this controller has the open drive only, and takes a straight line of {} um from {low} V to {high} V for each leg",
+            micro(stroke * 1e6)
+        ),
+        "run `specgen commission`, which identifies the legs and names their records here; or name records that you have",
+    )
 }
 
 /// The stability check of the adaptation uses the static inverse only.

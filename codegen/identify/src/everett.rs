@@ -22,6 +22,14 @@ pub struct EverettTable {
 }
 
 impl EverettTable {
+    /// A leg without hysteresis that moves by `stroke` (m) over a range of voltages (V), on `grid` intervals.
+    #[must_use]
+    pub fn straight(grid: usize, [drive_min, drive_max]: [f64; 2], stroke: f64) -> Self {
+        let cells = (1..=grid).flat_map(|up| (0..up).map(move |down| up - down));
+        let nodes = cells.map(|cells| stroke * cells as f64 / grid as f64).collect();
+        Self { grid, drive_min, drive_max, nodes }
+    }
+
     /// Position of E(u_up, u_down) in [`EverettTable::nodes`], for 1 ≤ `up` ≤ N and `down` < `up`.
     #[must_use]
     pub const fn index(up: usize, down: usize) -> usize {

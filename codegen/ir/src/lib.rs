@@ -256,6 +256,9 @@ pub struct Hysteresis {
     /// Lead of the demanded leg displacements; none without a dead time and a resonance that is compensated.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub lead: Option<Lead>,
+    /// Whether the tables are those of records; otherwise the law never runs: the controller has the open drive only.
+    #[serde(skip_serializing_if = "Clone::clone")]
+    pub identified: bool,
 }
 
 impl Hysteresis {

@@ -170,6 +170,8 @@ impl Sentence {
         } else {
             format!(" Not measured: {}; a real machine accepts it only with --assumed-ok.", assumed.summary())
         };
+        let legs = if assumed.unidentified { " No leg is identified: on a machine the law does not run." } else { "" };
+        let resting = format!("{legs}{resting}");
         let on = if assumed.is_empty() { "" } else { ", on assumptions" };
         match verdict.answer {
             Answer::Ready => Self {

@@ -126,6 +126,7 @@ impl<C: Constants> Spec for AtRunTime<C> {
         pose_bound -> &[C::Real; 6] = &constants.common().pose_bound;
         permitted -> &[(PermittedRange<C::Real>, usize)] = &constants.common().permitted;
         sizes -> Sizes = constants.common().sizes;
+        is_identified -> bool = constants.common().identified;
     }
 
     fn reset(&self) -> Reset<Self> {
@@ -148,6 +149,7 @@ pub struct Common<T: Real> {
     pub pose_bound: [T; 6],
     pub permitted: Vec<(PermittedRange<T>, usize)>,
     pub sizes: Sizes,
+    pub identified: bool,
     /// At reset.
     pub memory: Box<[Memory<T>; LEGS]>,
     pub displacement: [T; LEGS],
@@ -187,6 +189,7 @@ impl<T: Real + Debug> Common<T> {
             pose_bound: convert.vector(&ir.bounds.pose),
             permitted: constants::permitted(convert, &ir.permitted),
             sizes: constants::sizes(ir),
+            identified: ir.hysteresis.identified,
             memory,
             displacement,
             code,

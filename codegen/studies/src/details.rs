@@ -12,11 +12,11 @@ use crate::lead::{self, LeadOf};
 /// Results of identification and the stability check, one per line.
 pub fn of(compiled: &Compilation) -> String {
     let mut text = String::new();
-    let assumed = compiled.assumptions.list();
+    let assumed = compiled.assumptions.summary();
     if !assumed.is_empty() {
         // Writing to a String cannot fail, here and below.
-        let _ = writeln!(text, "  not measured: {}", compiled.assumptions.summary());
-        assumed.iter().for_each(|one| text.push_str(&format!("    {one}\n")));
+        let _ = writeln!(text, "  not measured: {assumed}");
+        compiled.assumptions.list().iter().for_each(|one| text.push_str(&format!("    {one}\n")));
     }
     for (name, report) in compiled.model.hysteresis.records.iter().zip(&compiled.records) {
         let what = report.as_ref().map_or_else(|| "a given table".to_owned(), Report::summary);

@@ -196,7 +196,7 @@ impl Verdict {
         let mut lines = vec![self.headline()];
         let known = |subject: &Subject| self.line(*subject).map(|line| format!("  {:<9}{line}", subject.name()));
         lines.extend(Subject::ALL.iter().filter_map(known));
-        if !self.assumed.is_empty() {
+        if !self.assumed.summary().is_empty() {
             lines.push(format!("  {:<9}{}", "assumed", self.assumed.summary().replace(" assumed value", " value")));
         }
         if let Some(why) = &self.unmeasured {
@@ -334,6 +334,7 @@ mod tests {
         let of = |values: usize, simulated: usize| Assumptions {
             values: vec![String::new(); values],
             simulated: vec![String::new(); simulated],
+            unidentified: false,
         };
         for (assumed, headline, line) in [
             (
@@ -344,6 +345,11 @@ mod tests {
             (of(1, 0), "bench is ready on 1 assumed value: 1 limit kept, 1 warning", "1 value"),
             (of(0, 1), "bench is ready on a simulated leg record: 1 limit kept, 1 warning", "simulated leg record"),
             (of(0, 6), "bench is ready on 6 simulated leg records: 1 limit kept, 1 warning", "6 simulated leg records"),
+            (
+                Assumptions { unidentified: true, ..of(0, 0) },
+                "bench is ready on unidentified legs: 1 limit kept, 1 warning",
+                "unidentified legs",
+            ),
         ] {
             verdict.assumed = assumed;
             assert_eq!(verdict.text(), format!("{headline}\n  noise    2.70 ≤ 5 nm\n  assumed  {line}\n"));

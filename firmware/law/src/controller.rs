@@ -2,12 +2,12 @@
 
 /// Gives an emitted controller its public names: types and sizes of this spec, and functions that call the law with its
 /// constants. Invoke it at the root of the crate, beside the modules with the constants. `platform` or `legs` selects
-/// the law; the macro implements its trait with the constants.
+/// the law; the macro implements its trait with the constants. `open_drive`: no leg is identified.
 ///
 /// The functions that run a tick are not generic, so that each is compiled once, in the controller.
 #[macro_export]
 macro_rules! controller {
-    (platform) => {
+    (platform $(, $only:ident)?) => {
         /// Words of a command: the first of an input, before the measured ones.
         pub const COMMAND_WORDS: usize = $crate::platform::tick::command_words(task_space::CORRECTED);
         /// Words of a tick's input.
@@ -72,7 +72,7 @@ macro_rules! controller {
             }
         }
 
-        $crate::controller!(@both platform TaskSpace, super::task_space::CORRECTED != 0, [super::defaults::LINES, super::defaults::INPUT]);
+        $crate::controller!(@both platform TaskSpace, super::task_space::CORRECTED != 0, [super::defaults::LINES, super::defaults::INPUT] $($only)?);
     };
     (legs) => {
         pub use $crate::legs::tick::{COMMAND_WORDS, INPUT_NAMES, INPUT_WORDS, OUTPUT_NAMES, OUTPUT_WORDS};
@@ -104,7 +104,7 @@ macro_rules! controller {
 
         $crate::controller!(@both legs LegSpace, false, [0, false]);
     };
-    (@both $law:ident $kind:ident, $corrects:expr, [$lines:expr, $input:expr]) => {
+    (@both $law:ident $kind:ident, $corrects:expr, [$lines:expr, $input:expr] $($only:ident)?) => {
         pub use defaults::LEG_GAIN;
         pub use identity::{
             ASSUMED, Constants, DESCRIPTION, LEGS, PERIOD_SECONDS, Real, SCALAR_BITS, SPEC_DIGEST, SPEC_NAME, SPECGEN_VERSION,
@@ -147,6 +147,7 @@ macro_rules! controller {
                 permitted -> &[($crate::specgen_runtime::PermittedRange<Real>, usize)] = &permitted::SETTINGS;
                 sizes -> $crate::specgen_runtime::snapshot::Sizes = permitted::STATE;
                 reset -> $crate::Reset<Self> = supervision::at_rest();
+                is_identified -> bool = supervised::IDENTIFIED;
             }
         }
 
@@ -209,6 +210,8 @@ macro_rules! controller {
             /// Output of a supervised tick.
             pub type MachineOutput = $crate::MachineOutput<Constants>;
 
+            /// Whether the legs are identified. Otherwise there is only the open drive, and `run` is refused.
+            pub const IDENTIFIED: bool = $crate::controller!(@identified $($only)?);
             /// Words of a supervised tick's input.
             pub const MACHINE_INPUT_WORDS: usize = INPUT_WORDS + 2;
             /// Words of a supervised tick's output.
@@ -425,6 +428,12 @@ macro_rules! controller {
                 $crate::$law::stages::prepare(Constants, config, state, input);
             }
         }
+    };
+    (@identified) => {
+        true
+    };
+    (@identified open_drive) => {
+        false
     };
     (@accessors $($name:ident -> $type:ty = $value:expr;)+) => {
         $(

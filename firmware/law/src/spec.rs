@@ -53,6 +53,8 @@ pub trait Spec: Copy + Debug + PartialEq + 'static {
     fn sizes(&self) -> Sizes;
     /// The legs at reset.
     fn reset(&self) -> Reset<Self>;
+    /// Whether the tables are those of the legs. Otherwise the law never runs: the machine has the open drive only.
+    fn is_identified(&self) -> bool;
 }
 
 /// A spec with constants from the compiler, so that all sizes are known. [`controller!`](crate::controller) implements

@@ -3,7 +3,7 @@
 use specgen_runtime::CodeLimits;
 use specgen_runtime::linear::{component, each};
 use specgen_runtime::sensing::faults;
-use specgen_runtime::supervisor::{Fallback, Phase, Request, Sample, Supervisor, toward};
+use specgen_runtime::supervisor::{Cause, Fallback, Phase, Request, Sample, Supervisor, toward};
 
 use crate::machine::{MachineInput, MachineOutput};
 use crate::memory::LegMemory as _;
@@ -45,9 +45,13 @@ pub fn supervise<P: Spec>(
     let Machine { state, supervisor } = machine;
     let at_rest =
         supervisor.phase != Phase::Running && P::Law::codes(state).iter().all(|code| *code == p.supervision().rest);
-    let request = match input.request {
-        Request::Drive if supervisor.phase == Phase::Holding && !P::Law::may_drive(p, state) => Request::Hold,
-        request => request,
+    let is_refused = !p.is_identified() && input.request == Request::Run;
+    let request = match (input.request, supervisor.phase) {
+        (Request::Drive, Phase::Holding) if !P::Law::may_drive(p, state) => Request::Hold,
+        // A hold would end the wiring check.
+        (Request::Run, Phase::Arming) if is_refused => Request::None,
+        (Request::Run, _) if is_refused => Request::Hold,
+        (request, _) => request,
     };
     let enters = supervisor.decide(p.supervision(), request, input.events, at_rest);
     if enters {
@@ -56,7 +60,10 @@ pub fn supervise<P: Spec>(
     let channel = machine.supervisor.watch.take_turn();
     let (expected, target) = P::Law::expected_reading(p, &machine.state, channel);
     let (phase, cause) = (machine.supervisor.phase, machine.supervisor.cause);
-    let status = if phase == Phase::Running {
+    let status = if !p.is_identified() {
+        // Whatever the state.
+        hold(p, config, machine, &input.tick, channel, expected)
+    } else if phase == Phase::Running {
         run(p, config, machine, &input.tick, channel, [expected, target])
     } else if let Some(status) = P::Law::decelerate(p, config, machine, &input.tick) {
         status
@@ -71,6 +78,11 @@ pub fn supervise<P: Spec>(
     }
     // Written into the state's place at the end: a large output is slow to move.
     let finding = supervisor.finding();
+    // Not part of the state: it lasts as long as the request.
+    let cause = match cause {
+        Cause::None if is_refused && phase == Phase::Holding => Cause::NotIdentified,
+        cause => cause,
+    };
     MachineOutput { tick: outputs(p, state, status), phase, cause, amplifier_on: phase.is_powered(), finding }
 }
 
@@ -133,14 +145,11 @@ fn hold<P: Spec>(
     if faults == 0 {
         // Gauges are compared with the model only while the codes are constant.
         let compares = matches!(supervisor.phase, Phase::Arming | Phase::Holding);
-        if compares && !supervisor.is_checking(p.supervision()) {
-            supervisor.look(p.supervision(), channel, &sample(p, input, channel, expected));
-        }
-        if drives {
+        if compares && !supervisor.is_checking(p.supervision()) || drives {
+            let sample = sample(p, input, channel, expected);
             // The model of a leg that was not identified may be wrong, but a gauge must not be stuck.
-            let Sample { word, .. } = sample(p, input, channel, expected);
-            let sample = Sample { word, reading: expected, expected, error: None };
-            supervisor.look(p.supervision(), channel, &sample);
+            let reading = if drives || !p.is_identified() { expected } else { sample.reading };
+            supervisor.look(p.supervision(), channel, &Sample { reading, ..sample });
         }
         let readings = P::Law::readings(p, input.gauges());
         supervisor.check(p.supervision(), p.readings_per_leg(), &readings, limits);

@@ -37,6 +37,12 @@ impl MachineWord {
         let [phase, cause, on, ..] = word.to_le_bytes();
         Self { phase, cause, amplifier_on: on & 1 == 1, finding: (word as u32) >> 17 }
     }
+
+    /// Whether the machine refuses to run: it has the open drive only.
+    #[must_use]
+    pub fn cannot_run(&self) -> bool {
+        u64::from(self.cause) == Cause::NotIdentified.word()
+    }
 }
 
 /// Phase and, if there is one, cause as text; unknown values as numbers.

@@ -149,7 +149,7 @@ impl<'r, 'm, W: Write> RecordedController<'r, 'm, W> {
             let mut word = self.tick(&input, ARM)?;
             let start = self.recorder.tick();
             while word.phase != RUNNING {
-                if self.recorder.tick() - start >= ARMING {
+                if self.recorder.tick() - start >= ARMING || word.cannot_run() {
                     return Err(RecordingEnd::Supervisor { tick: self.recorder.tick() - 1, word });
                 }
                 // A request to arm that could not be followed at once waits as long as it is given.

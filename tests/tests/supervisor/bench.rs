@@ -10,6 +10,9 @@ pub use super::oracle::{
     RAMP_DOWN, RAMPING, RUN, RUNNING, STALLED, WORKSPACE,
 };
 
+/// The cause of a *run* that is refused.
+pub const NOT_IDENTIFIED: u8 = 19;
+
 /// A converter whose codes meet every threshold of the grid: 2.5 mV a code, 1250 codes a cell.
 pub const ALIGNED: (&str, &str) = ("[\"0 V\", \"150 V\"]", "[\"0 V\", \"163.8375 V\"]");
 
@@ -280,7 +283,7 @@ impl Bench {
             let step = (code - before).abs();
             assert!(step <= self.max_step, "tick {}: leg {leg} moves by {step} codes", self.tick);
         }
-        assert!(self.word.phase <= DRIVING && self.word.cause <= WORKSPACE, "tick {}: {:?}", self.tick, self.word);
+        assert!(self.word.phase <= DRIVING && self.word.cause <= NOT_IDENTIFIED, "tick {}: {:?}", self.tick, self.word);
         let powered = !matches!(self.word.phase, DISARMED | FAULTED);
         assert_eq!(self.word.amplifier_on, powered, "tick {}: amplifiers", self.tick);
         // A platform in motion is first brought to rest.

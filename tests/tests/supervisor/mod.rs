@@ -17,4 +17,5 @@ mod samples;
 mod sequences;
 mod stops;
 mod table;
+mod unidentified;
 mod wiring;

@@ -100,6 +100,7 @@ impl Choice {
             ("hysteresis", _) if key.name == "rate_tables" => self.dynamic,
             ("hysteresis", _) if key.name.starts_with("creep_") => !self.dynamic,
             ("hysteresis", _) if key.name == "dead_time" => !self.control,
+            ("actuator", _) if key.name == "cross_talk" => self.control,
             ("sensor", _) if matches!(key.name, "calibration" | "input_range") => self.control,
             ("trajectory", Presence::Rule(_)) if key.name != "lead" => {
                 (of_waveform, of_step) == (self.waveform, self.step)

@@ -35,8 +35,13 @@ pub fn calling(ir: &Ir) -> String {
 
 /// The text for a crate of these files, `src/NAME.rs` each.
 pub fn emit<'a>(ir: &Ir, header: &str, files: impl Iterator<Item = &'a str>) -> String {
-    let (law, page) = if ir.task_space.is_some() { ("platform", PLATFORM_PAGE) } else { ("legs", LEGS_PAGE) };
-    let title = format!("Controller of platform `{}`.", ir.name);
+    let (law, page) = match (&ir.task_space, ir.hysteresis.identified) {
+        (None, _) => ("legs", LEGS_PAGE),
+        (Some(_), true) => ("platform", PLATFORM_PAGE),
+        (Some(_), false) => ("platform, open_drive", PLATFORM_PAGE),
+    };
+    let only = if ir.hysteresis.identified { "" } else { ", with the open drive only: no leg is identified" };
+    let title = format!("Controller of platform `{}`{only}.", ir.name);
     let mut text = header.to_owned();
     let calling = calling(ir);
     let pages = page.lines().chain([""]).chain(calling.lines()).chain(["", LICENCE]);

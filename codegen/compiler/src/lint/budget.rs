@@ -132,7 +132,8 @@ pub fn least(model: &Model) -> [u64; 2] {
         Scalar::F64 => 8,
     };
     let nodes = (model.hysteresis.grid + 1) * (model.hysteresis.grid + 2) / 2;
-    let table = nodes * scalar * model.hysteresis.records.len();
+    // Without records there is one table, a straight line.
+    let table = nodes * scalar * model.hysteresis.records.len().max(1);
     // Each reversal is an extremum; six legs remember their own.
     let memory = 6 * model.hysteresis.memory * scalar;
     [table as u64, memory as u64]

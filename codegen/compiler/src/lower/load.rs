@@ -16,7 +16,7 @@ use super::linear::with_alike;
 use super::setpoint::motions::{self, Motions};
 use crate::figure::figure;
 use crate::ir::{Affine, Dynamics, LEGS, Load, LoadBound, Scalar, Setpoints};
-use specgen_language::diagnostic::{Diagnostic, Place, codes};
+use specgen_language::diagnostic::Diagnostic;
 use specgen_language::model::{DynamicsChoice, Model, TaskSpace};
 use specgen_numerics::{Expansion, expand_leg_forces, multiply6};
 
@@ -44,19 +44,6 @@ pub(super) fn lower(
     let affine = tracked.affine(scalar, tolerance);
     let bounds = spaces.each_ref().map(|space| space.bound(&affine));
     let taken = task.dynamics == DynamicsChoice::Cheapest && bounds[0].error <= tolerance;
-    let own = |coupling: &[[f64; 6]; 6]| (0..LEGS).find(|leg| coupling[*leg][*leg] != 0.0);
-    if let Some(leg) = model.actuator.cross_talk.as_ref().and_then(own) {
-        let message = format!("row {leg} has an entry for leg {leg} itself; the diagonal of E is zero");
-        let key = "actuator.cross_talk";
-        let place = model.spans.get(key).cloned().map_or(Place::Whole, Place::Spec);
-        return Err(vec![Diagnostic::new(
-            codes::OUT_OF_RANGE,
-            key,
-            place,
-            message,
-            "write 0 there: it is in the leg's gain".to_owned(),
-        )]);
-    }
     let coupled = model.actuator.cross_talk.zip(leg_jacobian(&model.geometry));
     let cross_talk = coupled.map(|(coupling, jacobian)| multiply6(&coupling, &jacobian));
     let with = |pose: [[f64; 6]; LEGS], more: &[[f64; 6]; LEGS]| {

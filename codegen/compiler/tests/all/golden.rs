@@ -205,7 +205,10 @@ fn build(source: &SpecSource, table_of_poses: Option<&str>) -> Result<GoldenOutp
         }
     }
     let scales = (0..model.hysteresis.records.len()).map(|leg| 1.0 - 0.01 * leg as f64);
-    let tables: Vec<EverettTable> = scales.map(|scale| table(&model, scale)).collect();
+    let mut tables: Vec<EverettTable> = scales.map(|scale| table(&model, scale)).collect();
+    if tables.is_empty() {
+        tables.push(EverettTable::straight(model.hysteresis.grid, model.actuator.voltage, model.actuator.stroke));
+    }
     let rate_tables = match &model.hysteresis.rate {
         RateDependence::DynamicPreisach(files) => {
             (1..=files.len()).map(|leg| table(&model, 1e-3 / leg as f64)).collect()

@@ -22,7 +22,7 @@ section! {
         grid: usize = integer(2, MAX_GRID as i64), Default(32), "N" ["n", "cells", "discretization"], 32;
         /// Number of reversals that the controller can store.
         memory: usize = integer(8, 256), Default(64), "" ["depth"], 64;
-        /// Reversal-curve files, relative to the spec: one for all legs, or six. A table written by `specgen identify -o` is used as it is.
+        /// Reversal-curve files, relative to the spec: one for all legs, or six. A table written by `specgen identify -o` is used as it is. With [control], [] as long as no leg is identified: the controller then has the open drive only.
         records: Vec<String> = Shape::Records, Required, "" ["record", "file", "files", "data"], ["records/reference-forc.csv"];
         /// Leg model of reversal-curve records: the Preisach table; or chosen by its error on curves that were held out, "auto"; or a family by name, with creep where the record shows it. A table written by `specgen identify -o` keeps its own.
         model: LegModelKind = one_of(LegModelKind::WORDS), Default("preisach"), "" ["leg_model", "family"], "preisach";
@@ -40,6 +40,14 @@ section! {
     and |fields, _table| {
         /// Rate dependence of the model.
         rate: RateDependence = rate(fields)?;
+    }
+}
+
+impl Hysteresis {
+    /// Whether there are records of the legs; otherwise the controller has the open drive only.
+    #[must_use]
+    pub fn is_identified(&self) -> bool {
+        !self.records.is_empty()
     }
 }
 

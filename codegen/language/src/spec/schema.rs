@@ -146,11 +146,13 @@ fn key_schema(key: &Key) -> Value {
         }
         Shape::Records => {
             let file = Value::Object(item_schema(Item::File));
-            let lists = json!([{"minItems": 1, "maxItems": 1}, {"minItems": 6, "maxItems": 6}]);
+            // A required list may be empty: there are no records yet.
+            let counts: &[usize] = if key.presence == Presence::Required { &[0, 1, 6] } else { &[1, 6] };
+            let lists: Vec<Value> = counts.iter().map(|count| json!({"minItems": count, "maxItems": count})).collect();
             let mut array = Map::new();
             array.insert("type".into(), json!("array"));
             array.insert("items".into(), file);
-            array.insert("oneOf".into(), lists);
+            array.insert("oneOf".into(), json!(lists));
             array
         }
     };

@@ -9,7 +9,7 @@ use serde_json::json;
 use specgen_link::client::{ClientError, Port};
 use specgen_link::{RecorderStatus, Refusal, Status};
 use specgen_runtime::setpoint::{BUSY, REFUSED};
-use specgen_runtime::supervisor::{Phase, Request};
+use specgen_runtime::supervisor::{Cause, Phase, Request};
 
 use super::answer::{Acknowledgement, Answer, Destination, DownloadReport, MachineStatus, RecorderState};
 use super::error::{SessionError, unsupported, waving};
@@ -411,6 +411,10 @@ impl<P: Port> Operator<P> {
         loop {
             if until == WaitCondition::Arrived && self.was_stopped {
                 return Err(self.stopped_by_others());
+            }
+            let is_refused = u64::from(self.session.status().cause) == Cause::NotIdentified.word();
+            if until == WaitCondition::Phase(Phase::Running) && is_refused {
+                return Err(SessionError::Refused(format!("the machine is {} and cannot run", self.state())));
             }
             let there = match until {
                 WaitCondition::Phase(phase) => u64::from(self.session.status().phase) == phase.word(),

@@ -345,6 +345,10 @@ impl<P: Port> Operator<P> {
             (Phase::Disarmed, _) => "`arm`, then `run`".to_owned(),
             (Phase::Arming, _) => "`run` can be requested now".to_owned(),
             (Phase::Holding, Cause::None) => "`run` to continue, `ramp-down` to switch off".to_owned(),
+            (Phase::Holding, Cause::NotIdentified) => {
+                "`drive`: this machine has the open drive only, until `specgen commission` has identified its legs"
+                    .to_owned()
+            }
             (Phase::Holding, cause) => {
                 format!("holding because of {}: when that is fixed, `none`, then `run`", cause.name())
             }

@@ -48,6 +48,10 @@ fn cause(cause: Cause) -> (&'static str, &'static str) {
             "The platform came near the end of its workspace in an open drive.",
             "Drive fewer legs at a time, or less.",
         ),
+        Cause::NotIdentified => (
+            "The legs are not identified: this machine has the open drive only.",
+            "Drive it, or identify the legs: `specgen commission`.",
+        ),
         Cause::Stalled => ("The controller stalled.", "Was a debugger attached, or the computer suspended?"),
         Cause::Oscillation => (
             "The platform oscillates.",

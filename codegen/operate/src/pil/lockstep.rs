@@ -249,7 +249,7 @@ impl<P: Port> Lockstep<P> {
         let mut standing = self.host.standing(&input).map_err(Stop::Settings)?;
         let mut word = self.tick(&input, ARM)?;
         while word.phase != RUNNING {
-            if self.tick >= ARMING {
+            if self.tick >= ARMING || word.cannot_run() {
                 return Err(Stop::Supervisor { tick: self.tick, word });
             }
             // The supervisor accepts `run` once it is armed.

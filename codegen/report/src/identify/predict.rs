@@ -78,9 +78,9 @@ fn model(path: &Path, leg: usize, ui: &mut Ui) -> Result<RateModel, Failure> {
         let model = spec_file::model(path)?;
         let declared = declared::records(&model, dir).map_err(refused)?;
         ui.findings(None, &declared.warnings);
-        return declared
-            .leg(&model, leg)
-            .ok_or_else(|| Failure::Usage(format!("`{}` has no records in hysteresis.records", path.display())));
+        return declared.leg(&model, leg).ok_or_else(|| {
+            Failure::Usage(format!("`{}` has no records in hysteresis.records: no leg is identified", path.display()))
+        });
     }
     let shown = path.display().to_string();
     let text = read_file(path, &shown).map_err(refused)?;

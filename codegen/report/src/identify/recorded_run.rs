@@ -35,6 +35,11 @@ pub(super) fn records(
             &"the second weight of (6) has a separate gain: identify each leg with `specgen identify rate`",
         ));
     }
+    if !model.hysteresis.is_identified() {
+        return Err(refuse(
+            &"no leg of the spec is identified: run `specgen commission`, or name records in hysteresis.records",
+        ));
+    }
     declared::records(model, spec.parent().unwrap_or(Path::new(""))).map_err(refused)
 }
 

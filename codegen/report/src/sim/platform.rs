@@ -186,6 +186,7 @@ struct Motion {
 impl Outcome for Report<'_> {
     fn text(&self) -> String {
         let records = match self.records {
+            0 => "a straight line for each leg: none is identified, and on a machine this law does not run".to_owned(),
             1 => "one hysteresis record for all legs".to_owned(),
             many => format!("{many} hysteresis records"),
         };

@@ -130,12 +130,14 @@ choice! {
         AmplifierFault = 17 => "amplifier fault",
         /// The measured pose came near the end of the workspace in an open drive.
         Workspace = 18 => "end of the workspace",
+        /// [`Request::Run`] is given, but no leg is identified: the machine has the open drive only. Not a condition.
+        NotIdentified = 19 => "legs not identified",
     }
 }
 
 impl Cause {
     /// All but [`Cause::None`], in the order of their words.
-    pub const ALL: [Self; 18] = [
+    pub const ALL: [Self; 19] = [
         Self::GaugeNotFinite,
         Self::GaugeRange,
         Self::GaugeStuck,
@@ -154,9 +156,10 @@ impl Cause {
         Self::Oscillation,
         Self::AmplifierFault,
         Self::Workspace,
+        Self::NotIdentified,
     ];
 
-    /// Its bit in conditions: 1 << word; beyond 15, a bit that gauges and legs leave free.
+    /// Its bit in conditions: 1 << word; beyond 15, a bit that gauges and legs leave free. None if it is no condition.
     #[inline]
     #[must_use]
     pub const fn bit(self) -> u32 {
@@ -164,6 +167,7 @@ impl Cause {
             Self::Oscillation => 1 << OSCILLATION_CONDITION,
             Self::AmplifierFault => 1 << AMPLIFIER_CONDITION,
             Self::Workspace => 1 << WORKSPACE_CONDITION,
+            Self::NotIdentified => 0,
             other => 1 << other.word(),
         }
     }
@@ -227,12 +231,13 @@ mod tests {
             assert_eq!(Phase::from_word(word).map(Phase::word), Some(word));
             assert_eq!(Request::from_word(word).word(), word);
         }
-        for word in 0..19 {
+        for word in 0..20 {
             assert_eq!(Cause::from_word(word).map(Cause::word), Some(word));
         }
         for (index, cause) in (1..).zip(Cause::ALL) {
             assert_eq!(cause.word(), index);
-            assert_eq!(Cause::of_lowest(cause.bit()), cause);
+            let found = if cause == Cause::NotIdentified { Cause::None } else { cause };
+            assert_eq!(Cause::of_lowest(cause.bit()), found);
         }
         for bits in [0, 1 << 16, 1 << 22, 1 << 29, 1 << 30, 0x6fff_0000] {
             assert_eq!(Cause::of_lowest(bits), Cause::None, "gauges, legs, and other bits");
@@ -240,7 +245,7 @@ mod tests {
         assert_eq!(Cause::of_lowest(Cause::Workspace.bit() | Cause::LinkLost.bit()), Cause::LinkLost);
         let bits = [Cause::Workspace, Cause::Oscillation, Cause::AmplifierFault].map(Cause::bit);
         assert_eq!(bits, [1, 1 << 28, 1 << 31]);
-        assert_eq!((Phase::from_word(7), Cause::from_word(19)), (None, None));
+        assert_eq!((Phase::from_word(7), Cause::from_word(20)), (None, None));
         assert_eq!((Request::from_word(7), Request::from_word(u64::MAX)), (Request::Hold, Request::Hold));
     }
 

@@ -21,9 +21,9 @@ pub(super) fn parts_need_it(f: &Fields, findings: &mut Findings) -> Option<()> {
     }
     let tables = ["gauge[0]", "trajectory[0]", "trigger[0]", "mode[0]", "robust.structure"];
     let parts = tables.iter().filter_map(|path| Some((*path, f.table(path)?)));
-    let key = "sensor.calibration";
-    let calibration = f.given(key).then(|| (key, f.span(key)));
-    for (path, span) in parts.chain(calibration) {
+    let keys = ["actuator.cross_talk", "sensor.calibration"];
+    let keys = keys.into_iter().filter(|key| f.given(key)).map(|key| (key, f.span(key)));
+    for (path, span) in parts.chain(keys) {
         let what = path.split('[').next().unwrap_or(path);
         findings.add(
             codes::WITHOUT_CONTROL,

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use super::control;
 use crate::diagnostic::codes;
 use crate::files;
 use crate::keys::fields::Fields;
@@ -19,7 +20,17 @@ pub(in crate::spec) fn readable(f: &Fields, dir: &Path, findings: &mut Findings)
 
 fn readable_of(f: &Fields, dir: &Path, findings: &mut Findings, key: &str) -> Option<()> {
     let records = f.texts(key)?;
-    if !matches!(records.len(), 1 | 6) {
+    // Without records there is only the open drive, which six legs with their own gauges do not have.
+    let none = key == KEYS[0] && records.is_empty();
+    if none && control::there(f).is_none() {
+        findings.add(
+            codes::RECORD_COUNT,
+            key,
+            f.span(key),
+            format!("`{key}` names no file, and without [control] there is no open drive"),
+            "name one file for all legs, or six: one for each leg, in the order of the joints".to_owned(),
+        );
+    } else if !none && !matches!(records.len(), 1 | 6) {
         findings.add(
             codes::RECORD_COUNT,
             key,
