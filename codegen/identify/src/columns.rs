@@ -3,20 +3,24 @@
 //! [`Format`] has the codes and texts for the mistakes of a kind of file. Lines are read one by one, so that only the
 //! numbers are kept in memory.
 
+mod alignment;
 pub(crate) mod foreign;
 mod head;
 mod lines;
 pub(crate) mod names;
 mod number;
 mod scan;
+mod signs;
 
 use std::io::Read;
 
 use super::findings::Findings;
-use head::{Line, has_fields, is_mark, split};
+use alignment::misaligned;
+use head::{Line, has_fields, is_mark, names_of, split};
 use lines::LineReader;
 use names::Conversion;
-use number::{SinceFirst, clock};
+use number::{Clock, SinceFirst, clock, is_date};
+use signs::Signs;
 use specgen_language::diagnostic::{Code, codes};
 use specgen_language::interrupt;
 
@@ -71,12 +75,14 @@ pub(crate) struct Column<'a> {
 /// The lines after the header.
 pub(crate) struct Lines<'a> {
     format: &'a Format,
-    names: usize,
+    names: Vec<String>,
+    /// Number of the names, or of the fields of the first row if there are none.
+    count: usize,
     separator: u8,
-    /// Decimal sign of the file, once a number has one.
-    decimal: Option<char>,
     /// Times of day so far.
     clock: Option<SinceFirst>,
+    /// Places of dates in columns of their own, once a row is read.
+    dates: Option<Vec<usize>>,
     /// Whether an earlier line marked the file as simulated.
     simulated: bool,
     /// The last line of the table, if others follow.
@@ -101,7 +107,7 @@ pub const SIMULATED: &str = "# simulated by specgen: no leg was measured";
 /// Whether the text of a data file is marked as simulated: by a comment whose first word is `simulated`.
 #[must_use]
 pub fn is_simulated(text: &str) -> bool {
-    text.lines().any(|line| is_mark(line.as_bytes()))
+    text.split(['\n', '\r']).any(|line| is_mark(line.as_bytes()))
 }
 
 /// The text of a table or record with the mark below its first line.
@@ -160,13 +166,19 @@ pub(crate) fn open_part<'a>(
         let help = "export with a point in the times, as in `10:00:01.123`, or with semicolons between the columns";
         return findings.refuse(format.value, Some(line), message, help);
     }
+    if format.preamble {
+        head.drop_unfit_names(&ahead);
+    }
+    let first = ahead.iter().find(|(_, line)| has_fields(line)).filter(|_| head.names.is_empty());
+    let count = first.map_or(head.names.len(), |(_, row)| split(row, head.separator).len());
     input.put_back(ahead);
     let lines = Lines {
         format,
-        names: head.names.len(),
+        names: head.names.clone(),
+        count,
         separator: head.separator,
-        decimal: None,
         clock: None,
+        dates: None,
         simulated,
         last: part.last,
         input,
@@ -257,6 +269,7 @@ fn of_arrays(arrays: &[(String, Vec<f64>)], comment: &str, wanted: &[Column], fi
     Samples { lines: LineNumbers::consecutive(2, rows), columns, simulated }
 }
 
+const ONE_EACH: &str = "one value to each column, a point as decimal sign";
 const EMPTY: &str = "the first line must be the header `time_s,drive_V,displacement_um`";
 
 /// Reports an invalid byte `byte` at position `at` of its line.
@@ -270,6 +283,7 @@ impl Lines<'_> {
     pub(crate) fn read(mut self, wanted: &[Column], findings: &mut Findings) -> Samples {
         let mut lines = LineNumbers::default();
         let mut columns = vec![Vec::new(); wanted.len()];
+        let mut signs = Signs::new(self.separator, wanted.len());
         let mut text = Vec::new();
         loop {
             interrupt::point();
@@ -283,6 +297,7 @@ impl Lines<'_> {
             };
             if !has_fields(&text) {
                 self.simulated |= is_mark(&text);
+                self.check_comment(&text, line, findings);
                 continue;
             }
             if lines.len() == MAX_SAMPLES {
@@ -293,22 +308,53 @@ impl Lines<'_> {
             let fields = split(&text, self.separator);
             if let Some([message, help]) = self.format.whole_line {
                 let number = |field: &&[u8]| self.finite(field).is_some();
-                if fields.len() != self.names || !fields.iter().all(number) {
+                if fields.len() != self.count || !fields.iter().all(number) {
                     findings.add(self.format.value, Some(line), message.to_owned(), help);
                     columns.iter_mut().for_each(|column| column.push(f64::NAN));
                     continue;
                 }
             }
-            for (column, wanted) in columns.iter_mut().zip(wanted) {
-                column.push(self.number(fields.get(wanted.at).copied(), line, wanted, findings));
-            }
-            if fields.len() > self.names && !self.format.longer_lines {
-                let message = format!("has {} values, expected {}", fields.len(), self.names);
-                let help = "one value to each column, a point as decimal sign";
+            if let Some(help) = self.misaligned(&fields) {
+                let message = format!("has {} values, expected {}", fields.len(), self.count);
                 findings.add(self.format.value, Some(line), message, help);
+                columns.iter_mut().for_each(|column| column.push(f64::NAN));
+                continue;
             }
+            for (k, (column, wanted)) in columns.iter_mut().zip(wanted).enumerate() {
+                column.push(self.number(&fields, (line, k), wanted, &mut signs, findings));
+            }
+            signs.look_at(&fields);
+        }
+        if let Some((column, line, text)) = signs.doubt() {
+            self.format.report_doubt(line, wanted[column].name, text, findings);
         }
         Samples { lines, columns, simulated: self.simulated }
+    }
+
+    /// How to mend a row whose fields are not those of the columns.
+    fn misaligned(&self, fields: &[&[u8]]) -> Option<&'static str> {
+        // Without names, a shorter row is one of another kind, whatever separates its fields.
+        let separator = if self.names.is_empty() { head::BLANK } else { self.separator };
+        let is_long = fields.len() > self.count && !self.format.longer_lines;
+        is_long.then_some(ONE_EACH).or_else(|| misaligned(fields, self.count, separator))
+    }
+
+    /// Refuses a comment between the rows that names the columns otherwise than the header.
+    fn check_comment(&self, comment: &[u8], line: usize, findings: &mut Findings) {
+        let own = names_of(comment);
+        let sorted = |names: &[String]| {
+            let mut names = names.to_vec();
+            names.sort_unstable();
+            names
+        };
+        let is_header =
+            own.iter().filter(|name| names::has_unit(name)).count() > 1 || sorted(&own) == sorted(&self.names);
+        if own.len() > 1 && is_header && own != self.names && !self.names.is_empty() {
+            let message =
+                format!("a comment names the columns below it otherwise than the header: `{}`", own.join(","));
+            let help = "write these rows into a file of their own";
+            findings.add(self.format.header, Some(line), message, help);
+        }
     }
 
     fn finite(&self, field: &[u8]) -> Option<f64> {
@@ -317,9 +363,16 @@ impl Lines<'_> {
     }
 
     /// The number in a field in the unit of the quantity, or NaN after the problem was reported.
-    fn number(&mut self, field: Option<&[u8]>, line: usize, column: &Column, findings: &mut Findings) -> f64 {
+    fn number(
+        &mut self,
+        fields: &[&[u8]],
+        (line, k): (usize, usize),
+        column: &Column,
+        signs: &mut Signs,
+        findings: &mut Findings,
+    ) -> f64 {
         let (format, name) = (self.format, column.name);
-        let Some(field) = field else {
+        let Some(&field) = fields.get(column.at) else {
             let message = format!("`{name}` is missing: the line is too short");
             findings.add(format.value, Some(line), message, "complete or delete the line");
             return f64::NAN;
@@ -331,13 +384,19 @@ impl Lines<'_> {
         }
         let text = decoded(field);
         let time = clock(&text);
+        let is_clock = time.is_some();
         if let Some(time) = time.filter(|_| name == TIME) {
-            return self.clock.get_or_insert(SinceFirst::new(time)).seconds(time);
+            return self.since_first(time, fields).unwrap_or_else(|| {
+                let message = format!("the date or the zone of `{text}` is another one, and does not say by how much");
+                let help = "write times in s, or in one zone with dates such as 2024-03-05";
+                findings.add(format.value, Some(line), message, help);
+                f64::NAN
+            });
         }
-        match number::number(&text, self.separator).filter(|_| time.is_none()) {
+        match number::number(&text, self.separator).filter(|_| !is_clock) {
             Some((value, _)) if !value.is_finite() => return format.report_not_finite(line, name, &text, findings),
             Some((value, sign)) => {
-                if sign.is_none() || *self.decimal.get_or_insert(sign.unwrap_or('.')) == sign.unwrap_or('.') {
+                if signs.add(k, line, &text, sign) {
                     return column.conversion.apply(value);
                 }
                 let message = format!("`{name}` is `{text}`: the numbers above have another decimal sign");
@@ -356,6 +415,15 @@ impl Lines<'_> {
         }
         f64::NAN
     }
+
+    /// Time of a row since the first, s; none if that is not known.
+    fn since_first(&mut self, time: Clock, fields: &[&[u8]]) -> Option<f64> {
+        let places = || (0..fields.len()).filter(|at| is_date(fields[*at])).collect();
+        let dates: Vec<&[u8]> =
+            self.dates.get_or_insert_with(places).iter().filter_map(|at| fields.get(*at).copied()).collect();
+        let time = time.with_dates(&dates);
+        self.clock.get_or_insert_with(|| SinceFirst::new(time.clone())).seconds(time)
+    }
 }
 
 impl Format {
@@ -364,6 +432,14 @@ impl Format {
         let (code, help) = self.not_finite;
         findings.add(code, Some(line), format!("`{name}` is `{shown}`, not a finite number"), help);
         f64::NAN
+    }
+
+    fn report_doubt(&self, line: usize, name: &str, text: &str, findings: &mut Findings) {
+        let sign = if text.contains(',') { "comma" } else { "point" };
+        let message =
+            format!("`{name}` is `{text}`: the {sign} may divide thousands, and no number shows that it does not");
+        let help = "export without a sign between thousands, and with a point and four decimals";
+        findings.add(self.value, Some(line), message, help);
     }
 
     fn report_too_many(&self, line: Option<usize>, findings: &mut Findings) {

@@ -88,7 +88,14 @@ impl Reading {
     /// The expected form, for the first that does not have it.
     pub fn new(columns: &[String], rate: Option<f64>) -> Result<Self, String> {
         let entries = columns.iter().flat_map(|list| entries(list));
-        Ok(Self { columns: entries.map(column_choice).collect::<Result<_, _>>()?, rate, ..Self::default() })
+        let columns = entries.map(column_choice).collect::<Result<Vec<_>, _>>()?;
+        let other = |k: usize| columns[..k].iter().find(|other| other.quantity == columns[k].quantity);
+        match (0..columns.len()).find_map(|k| Some((other(k)?, &columns[k]))) {
+            Some((first, second)) => {
+                Err(format!("`{}` and `{}` name two columns for {}: give one", first.text, second.text, first.quantity))
+            }
+            None => Ok(Self { columns, rate, ..Self::default() }),
+        }
     }
 
     /// The same, of the table with this name or number (from 1) in a file that has several.
@@ -118,14 +125,14 @@ impl Reading {
         self.rate
     }
 
-    /// The column that the user names for a quantity; the last one if there are several.
+    /// The column that the user names for a quantity.
     pub(crate) fn column(&self, quantity: &str) -> Option<&ColumnChoice> {
-        self.columns.iter().rev().find(|chosen| chosen.quantity == quantity)
+        self.columns.iter().find(|chosen| chosen.quantity == quantity)
     }
 
-    /// The columns that the user names, the last one for each quantity.
+    /// The columns that the user names, one for each quantity.
     pub(crate) fn chosen(&self) -> impl Iterator<Item = &ColumnChoice> {
-        self.columns.iter().filter(|one| self.column(one.quantity) == Some(*one))
+        self.columns.iter()
     }
 
     /// The column with sample numbers.
@@ -238,6 +245,7 @@ mod tests {
             ("time_s=1,speed_V=2", "`time_s`, `drive_V`"),
             ("displacement=CH2*5 V/um", "a unit of `displacement`"),
             ("displacement=CH2*x", "a factor"),
+            ("drive_V=1,drive_mV=2", "two columns for drive_V"),
         ] {
             let found = Reading::new(&[text.to_owned()], None).unwrap_err();
             assert!(found.contains(expected), "{found}");

@@ -228,3 +228,6 @@ mod labs;
 #[cfg(test)]
 #[path = "record/tests/mat_file.rs"]
 mod mat_file;
+#[cfg(test)]
+#[path = "record/tests/misread.rs"]
+mod misread;

@@ -1,7 +1,8 @@
 //! Reads states of a platform: a CSV file of eighteen columns with a line of names, in SI units unless a name has another
-//! unit in brackets, such as `x (um)`, `vz [um/s]` or `ax [um/s^2]`.
+//! unit, such as `x (um)`, `vz [um/s]` or `ax_um/s^2`. The columns have a fixed order. A name that says another place or
+//! ends with what may be an unknown unit is refused.
 
-use crate::columns::names::{COORDINATES, Conversion, unit_in_brackets};
+use crate::columns::names::{COORDINATES, Conversion, PER_TIME, plain};
 use crate::columns::{self, Column, Format, RECORD};
 use crate::findings::Findings;
 use specgen_language::diagnostic::{Diagnostic, codes};
@@ -20,19 +21,26 @@ const HELP: &str = "write 18 names, of pose, rate and acceleration in x, y, z, �
 pub fn parse(text: &str, shown_as: &str) -> Result<Vec<State>, Vec<Diagnostic>> {
     let mut findings = Findings::new(shown_as);
     let states = columns::open(text.as_bytes(), &FORMAT, &mut findings).and_then(|(header, lines)| {
-        let columns = header.names.iter().enumerate();
-        let columns = columns.map(|(at, name)| Some(Column { at, name, conversion: conversion(at, name)? }));
-        let names: Vec<Option<Column>> = columns.collect();
+        let names = header.names.iter().enumerate();
+        let meanings: Vec<Option<(&str, Conversion)>> = names.clone().map(|(at, name)| meaning(at, name)).collect();
+        let misplaced = meanings.iter().enumerate().find_map(|(at, found)| {
+            let place = place((*found)?.0)?;
+            (place != at).then_some((at, place))
+        });
         let is_number = |name: &&String| name.parse::<f64>().is_ok();
         let wrong = if let Some(number) = header.names.iter().find(is_number) {
             format!("the first line names the columns, but `{number}` is a number")
-        } else if names.len() != COLUMNS {
-            format!("there are {} columns, expected {COLUMNS}", names.len())
-        } else if let Some(unknown) = names.iter().position(Option::is_none) {
+        } else if meanings.len() != COLUMNS {
+            format!("there are {} columns, expected {COLUMNS}", meanings.len())
+        } else if let Some(unknown) = meanings.iter().position(Option::is_none) {
             format!("the unit of `{}` is not known in column {}", header.names[unknown], unknown + 1)
+        } else if let Some((at, place)) = misplaced {
+            format!("`{}` is column {} of a state, but column {} of the file", header.names[at], place + 1, at + 1)
         } else {
-            let names: Vec<Column> = names.into_iter().flatten().collect();
-            let columns = lines.read(&names, &mut findings).columns;
+            let columns = names.zip(meanings.iter().flatten());
+            let columns: Vec<Column> =
+                columns.map(|((at, name), &(_, conversion))| Column { at, name, conversion }).collect();
+            let columns = lines.read(&columns, &mut findings).columns;
             let count = columns.first().map_or(0, Vec::len);
             let state = |row: usize| -> State {
                 core::array::from_fn(|part| core::array::from_fn(|axis| columns[6 * part + axis][row]))
@@ -44,24 +52,67 @@ pub fn parse(text: &str, shown_as: &str) -> Result<Vec<State>, Vec<Diagnostic>> 
     findings.conclude(states).map(|(states, _)| states)
 }
 
-/// From the unit of column `at`, from 0, to SI units: names without a unit have them. None if the unit is
-/// not one of the coordinate, per s for a rate and per s² for an acceleration.
-fn conversion(at: usize, name: &str) -> Option<Conversion> {
-    // `x_um`, or nothing: then they are in SI units.
-    let behind = || {
-        let (_, unit) = name.trim().rsplit_once('_')?;
-        let coordinate = unit.split('/').next().unwrap_or_default();
-        COORDINATES[at % 6].per(coordinate).map(|_| unit.to_owned())
+/// Letters between the parts of a name.
+const BETWEEN: [char; 4] = ['_', ' ', '/', ','];
+/// What ends a name that has no unit, beside numbers.
+const ENDINGS: [&str; 8] = ["x", "y", "z", "dot", "ddot", "dt", "dt2", "dt^2"];
+
+/// A name, and the unit behind it in brackets; or the whole name.
+fn divided(name: &str) -> (&str, Option<&str>) {
+    let name = name.trim();
+    let of = |open: char, close: char| name.strip_suffix(close)?.rsplit_once(open);
+    match of('(', ')').or_else(|| of('[', ']')) {
+        // An index.
+        Some((_, inner)) if inner.trim().parse::<u8>().is_ok() => (name, None),
+        Some((name, unit)) => (name.trim_end(), Some(unit)),
+        None => (name, None),
+    }
+}
+
+/// Whether a name ends with no unit.
+fn has_no_unit(name: &str) -> bool {
+    match name.rsplit_once(BETWEEN) {
+        None => !name.ends_with([')', ']']) || divided(name).1.is_none(),
+        Some((_, last)) => {
+            ENDINGS.contains(&last.to_lowercase().as_str())
+                || last.trim_matches(['[', ']', '(', ')']).parse::<u8>().is_ok()
+        }
+    }
+}
+
+/// The name of column `at`, from 0, without its unit, and the conversion to SI units, which a name without unit has. None if
+/// what it ends with is not a unit of the coordinate, per s for a rate and per s² for an acceleration.
+fn meaning(at: usize, name: &str) -> Option<(&str, Conversion)> {
+    let per_time = at.checked_sub(6).and_then(|at| PER_TIME.get(at / 6)).map_or(&[""][..], |endings| *endings);
+    let of = |unit: &str| {
+        let ends = |ending: &&str| unit.len().checked_sub(ending.len()).and_then(|k| unit.split_at_checked(k));
+        let mut divided =
+            per_time.iter().filter_map(|ending| ends(ending).filter(|(_, end)| end.eq_ignore_ascii_case(ending)));
+        // Coordinates are in µm and µrad.
+        Some(Conversion::unit(1e6 * COORDINATES[at % 6].per(divided.next()?.0)?))
     };
-    let Some(unit) = unit_in_brackets(name).or_else(behind) else { return Some(Conversion::unit(1.0)) };
-    let per_time: &[&str] = match at / 6 {
-        0 => &[""],
-        1 => &["/s"],
-        _ => &["/s^2", "/s2", "/s²", "/s/s"],
-    };
-    let unit = per_time.iter().find_map(|ending| unit.strip_suffix(ending))?;
-    // Coordinates are in µm and µrad.
-    Some(Conversion::unit(1e6 * COORDINATES[at % 6].per(unit)?))
+    match divided(name) {
+        (name, Some(unit)) => Some((name, of(unit.trim())?)).filter(|_| has_no_unit(name)),
+        (name, None) if has_no_unit(name) => Some((name, Conversion::unit(1.0))),
+        // `vx_mm_s` is `vx_mm/s`.
+        (name, None) => name.match_indices(BETWEEN).find_map(|(k, _)| {
+            let unit = name[k + 1..].replace('_', "/");
+            Some((&name[..k], of(&unit)?)).filter(|(name, _)| has_no_unit(name))
+        }),
+    }
+}
+
+/// How usual names of positions, angles, and so on begin.
+const BEGINNINGS: [&[&str]; 6] =
+    [&["", "p"], &["r", "theta", "θ"], &["v"], &["w", "omega", "ω"], &["a"], &["alpha", "α"]];
+
+/// The place that a usual name says.
+fn place(name: &str) -> Option<usize> {
+    let name = plain(name);
+    let is_at =
+        |at: &usize| BEGINNINGS[at / 3].iter().any(|begin| name.strip_prefix(begin) == Some(["x", "y", "z"][at % 3]));
+    let turn = || ["roll", "pitch", "yaw"].iter().position(|turn| name == *turn).map(|axis| 3 + axis);
+    (0..COLUMNS).find(is_at).or_else(turn)
 }
 
 #[cfg(test)]
@@ -84,11 +135,37 @@ mod tests {
 
     #[test]
     fn units_behind_a_name_are_converted() {
-        for (at, name, factor) in
-            [(0, "x_um", 1e6), (3, "theta_x_urad", 1e6), (6, "vx_um/s", 1e6), (0, "x", 1.0), (3, "theta_x", 1.0)]
-        {
-            let found = format!("{:?}", conversion(at, name));
-            assert_eq!(found, format!("{:?}", Some(Conversion::unit(factor))), "{name}");
+        for (at, name, factor) in [
+            (0, "x_um", Some(1e6)),
+            (3, "theta_x_urad", Some(1e6)),
+            (6, "vx_um/s", Some(1e6)),
+            (6, "vx_mm_s", Some(1e3)),
+            (6, "vx mm/s", Some(1e3)),
+            (12, "ax_mm_s2", Some(1e3)),
+            (12, "ax mm/s²", Some(1e3)),
+            (0, "x", Some(1.0)),
+            (3, "theta_x", Some(1.0)),
+            (9, "theta_x_dot", Some(1.0)),
+            (6, "dx/dt", Some(1.0)),
+            (0, "h[0]", Some(1.0)),
+            (0, "h_0", Some(1.0)),
+            (0, "x_ft", None),
+            (0, "x (ft)", None),
+            (0, "x (mm) [m]", None),
+            (0, "x_mm [m]", None),
+            (0, "x mm filtered", None),
+            (6, "vx_mm", None),
+            (6, "vx_um/s2", None),
+            (9, "wx_rpm", None),
+            (9, "wx dps", None),
+            (9, "wx_deg/min", None),
+        ] {
+            let found = meaning(at, name).map(|(_, conversion)| conversion.per);
+            assert!(found.is_some() == factor.is_some(), "{name}: {found:?}");
+            assert!(
+                found.zip(factor).is_none_or(|(a, b): (f64, f64)| (a / b - 1.0).abs() < 1e-12),
+                "{name}: {found:?}"
+            );
         }
     }
 
@@ -114,6 +191,35 @@ mod tests {
         }
         let found = parse(&format!("{}\n{}\n", names.replace("mm/s", "mm"), row("0")), "s.csv").unwrap_err();
         assert!(found[0].message.contains("`vx [mm]`"), "{found:?}");
+    }
+
+    /// Names, numbers and words of the refusal.
+    #[test]
+    fn columns_in_another_order_and_fields_beside_them_are_refused() {
+        let pose = "x,y,z,rx,ry,rz";
+        let rate = "vx,vy,vz,wx,wy,wz";
+        let last = "ax,ay,az,alpha_x,alpha_y,alpha_z";
+        let usual = format!("{pose},{rate},{last}");
+        assert!(parse(&format!("{usual}\n{}\n", row("0")), "s.csv").is_ok());
+        for (names, row, words) in [
+            (format!("{rate},{last},{pose}"), row("0"), "`vx` is column 7 of a state, but column 1"),
+            (format!("rx,ry,rz,x,y,z,{rate},{last}"), row("0"), "`rx` is column 4"),
+            (format!("roll,pitch,yaw,a,b,c,{rate},{last}"), row("0"), "`roll` is column 4"),
+            (format!("time_s,{usual}"), format!("0,{}", row("0")), "there are 19 columns"),
+            (usual.replace("alpha_z", "theta_z_dot_rpm"), row("0"), "the unit of `theta_z_dot_rpm`"),
+            (usual.clone(), format!("7,{}", row("0.5")), "has 19 values, expected 18"),
+            (usual.clone(), ["0,5"; 18].join(","), "has 36 values, expected 18"),
+            (usual.replace(',', ";"), ["1,234"; 18].join(";"), "the comma may divide thousands"),
+            (format!("{usual}\n{}", ["mm"; 18].join(",")), row("0"), "the unit of `rx [mm]`"),
+        ] {
+            let found = parse(&format!("{names}\n{row}\n"), "s.csv").unwrap_err();
+            assert!(found[0].message.contains(words) && !found[0].help.is_empty(), "{names}: {found:?}");
+        }
+        let units = "mm,mm,mm,mrad,mrad,mrad,mm/s,mm/s,mm/s,mrad/s,mrad/s,mrad/s,m/s2,m/s2,m/s2,rad/s2,rad/s2,rad/s2";
+        let [pose, rate, last] = parse(&format!("{usual}\n{units}\n{}\n", ["1"; 18].join(",")), "s.csv").unwrap()[0];
+        for (value, expected) in [(pose[0], 1e-3), (pose[3], 1e-3), (rate[5], 1e-3), (last[5], 1.0)] {
+            assert!((value / expected - 1.0_f64).abs() < 1e-12, "{value} {expected}");
+        }
     }
 
     #[test]

@@ -198,6 +198,17 @@ mod tests {
         assert!(refused("time_s\n1\n2\n")[0].contains("no coordinate"));
         assert!(refused("x_um,,z_um\n0,,2\n0,1,2\n")[0].contains("column 2 has values, but no name"));
         assert!(parse("x_um,,z_um\n0,,2\n0,,2\n", "w.csv", 1e-3).is_ok());
+        for (text, words) in [
+            ("x_um,theta_x_urad\num,mrad\n0,1\n1,2\n", "`theta_x_urad [mrad]` is not a column"),
+            ("x_um,y_um\nmm,mm\n0,1\n1,2\n", "`x_um [mm]` is not a column"),
+            ("x_um,-y_um\n0,1\n1,2\n", "`-y_um` is not a column"),
+            ("x_um;y_um\n0;1,250\n1;2,500\n", "`y_um` is `1,250`: the comma may divide thousands"),
+            ("x_um,y_um\n0,5,0\n1,5,0\n", "has 3 values, expected 2"),
+            ("x_um,y_um\n0,1\n# y_um,x_um\n1,2\n", "a comment names the columns"),
+        ] {
+            assert!(refused(text)[0].contains(words), "{:?}", refused(text));
+        }
+        assert!(parse("x_um;y_um\n0,000;1,250\n1,000;2,500\n", "w.csv", 1e-3).is_ok());
     }
 
     #[test]

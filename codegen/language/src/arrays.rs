@@ -5,6 +5,7 @@ use std::fmt::Write as _;
 use std::io::{self, Cursor, Write};
 use std::path::Path;
 
+use crate::quantity::may_divide_thousands;
 use flate2::Compression;
 use flate2::write::ZlibEncoder;
 use rawzip::ZipArchiveWriter;
@@ -73,13 +74,15 @@ pub struct Table {
 
 impl Table {
     /// A table in CSV: names, then rows with as many fields, without quotation marks. Semicolons or tabs in the line of
-    /// names separate instead of commas, which are decimal signs then. Empty fields are NaN.
+    /// names separate instead of commas, which are decimal signs then, unless each may divide thousands: such a column has
+    /// texts. Empty fields are NaN.
     #[must_use]
     pub fn of_csv(csv: &[u8]) -> Option<Self> {
         let text = std::str::from_utf8(csv).ok()?;
         let is_comment = |line: &&str| line.starts_with('#');
-        let comment: Vec<&str> = text.lines().filter(is_comment).map(|line| line[1..].trim()).collect();
-        let mut rows = text.lines().filter(|line| !is_comment(line) && !line.is_empty());
+        let lines = text.split(['\n', '\r']);
+        let comment: Vec<&str> = lines.clone().filter(is_comment).map(|line| line[1..].trim()).collect();
+        let mut rows = lines.filter(|line| !is_comment(line) && !line.is_empty());
         let head = rows.next()?;
         let separator = ['\t', ';'].into_iter().find(|sign| head.contains(*sign)).unwrap_or(',');
         let names: Vec<&str> = head.split(separator).map(str::trim).collect();
@@ -98,7 +101,9 @@ impl Table {
         if cells[0].is_empty() && names.len() < 2 || !names.iter().all(is_name) || head.contains('"') {
             return None;
         }
-        let columns = cells.into_iter().map(|fields| Column::of(&fields, separator));
+        let commas = || cells.iter().flatten().filter(|field| field.contains(','));
+        let has_decimals = separator != ',' && !commas().all(|field| may_divide_thousands(field, ','));
+        let columns = cells.iter().map(|fields| Column::of(fields, has_decimals));
         let columns = names.iter().map(|name| (*name).to_owned()).zip(columns).collect();
         Some(Self { columns, comment: comment.join("\n") })
     }
@@ -192,11 +197,12 @@ impl Table {
 }
 
 impl Column {
-    fn of(fields: &[&str], separator: char) -> Self {
+    /// `has_decimals`: whether commas are decimal signs.
+    fn of(fields: &[&str], has_decimals: bool) -> Self {
         let number = |field: &&str| match field.parse() {
             Ok(value) => Some(value),
             Err(_) if field.is_empty() => Some(f64::NAN),
-            Err(_) if separator != ',' => field.replace(',', ".").parse().ok(),
+            Err(_) if has_decimals => field.replace(',', ".").parse().ok(),
             Err(_) => None,
         };
         match fields.iter().map(number).collect() {
@@ -354,6 +360,11 @@ mod tests {
         let numbers = |k: usize| table.columns[k].1.clone();
         assert_eq!([numbers(0), numbers(1)], [[1.5, -3.0], [2.0, 4.25]].map(|values| Column::Numbers(values.into())));
         assert_eq!(table.csv(), "a,b,c\n# one, two\n1.5,2.0,x\n-3.0,4.25,y\n");
+        assert_eq!(Table::of_csv(b"a;b\r1;2\r3;4\r"), Table::of_csv(b"a;b\n1;2\n3;4\n"));
+        for (csv, texts) in [("a;b\n1,234;2\n5,678;3\n", true), ("a;b\n1,234;2\n0,678;3\n", false)] {
+            let table = Table::of_csv(csv.as_bytes()).unwrap();
+            assert_eq!(matches!(table.columns[0].1, Column::Texts(_)), texts, "{csv}");
+        }
         let quoted = Table { columns: vec![("t, \"s\"".to_owned(), numbers(0))], comment: String::new() };
         assert!(quoted.csv().starts_with("\"t, \"\"s\"\"\"\n"));
     }

@@ -249,5 +249,15 @@ pub fn unit_value(unit: &str) -> Option<Quantity> {
     parse(&format!("1 {unit}")).ok()
 }
 
+/// Whether `sign` in a number of a data file may divide thousands, as in `21,484`, which it does not in `0,484` or `21,48`.
+#[must_use]
+pub fn may_divide_thousands(number: &str, sign: char) -> bool {
+    let digits = number.trim_start_matches(['+', '-', '\u{2212}']).split_once(sign);
+    digits.is_some_and(|(whole, rest)| {
+        let is_digits = [whole, rest].iter().all(|text| text.bytes().all(|byte| byte.is_ascii_digit()));
+        is_digits && (1..=3).contains(&whole.len()) && !whole.starts_with('0') && rest.len() == 3
+    })
+}
+
 #[cfg(test)]
 mod tests;

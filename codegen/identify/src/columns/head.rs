@@ -3,6 +3,7 @@
 
 use super::names;
 use super::number::{clock, is_date, number};
+use specgen_language::quantity::may_divide_thousands;
 
 /// Number of lines in which the names are searched.
 pub(super) const LINES: usize = 300;
@@ -16,6 +17,8 @@ pub(crate) struct Head {
     pub(crate) line: usize,
     /// Time between samples stated in the preamble, s.
     pub(crate) interval: Option<f64>,
+    /// Numbers of the names and of the columns if they differ; the names are then not used.
+    pub(crate) unfit: Option<[usize; 2]>,
     /// Columns, from 0, that have a number in the first sample, and what their first samples are.
     pub(crate) filled: Vec<(usize, Shape)>,
     /// Index of the first line after them.
@@ -195,6 +198,7 @@ fn interval(line: &[u8]) -> Option<f64> {
     let number = words.next()?;
     let (number, unit) = match number.split_once(',') {
         Some((whole, unit)) if unit.starts_with(char::is_alphabetic) => (whole.to_owned(), Some(unit)),
+        _ if may_divide_thousands(number, ',') => return None,
         _ => (number.replace(',', "."), words.next()),
     };
     let unit = unit.map(|unit| unit.trim_matches(['[', ']', '(', ')']));
@@ -210,13 +214,10 @@ fn is_interval(step: &f64) -> bool {
     step.is_finite() && *step > 0.0
 }
 
-/// Rows that are checked for decimal commas.
-const ROWS: usize = 10;
-
 impl Head {
     /// Of a file without names whose first sample is in `line`.
     pub(super) fn without_names(line: usize, separator: u8) -> Self {
-        Self { names: Vec::new(), line, interval: None, filled: Vec::new(), next: 0, separator }
+        Self { names: Vec::new(), line, interval: None, unfit: None, filled: Vec::new(), next: 0, separator }
     }
 
     /// Of named arrays.
@@ -270,28 +271,6 @@ impl Head {
         let is_clock = |at: usize| first.as_ref().is_some_and(|row| clock(&decoded(row[at])).is_some());
         self.filled.iter_mut().filter(|(at, _)| is_clock(*at)).for_each(|(_, shape)| *shape = Shape::Clock);
     }
-
-    /// The line, the message and the help if commas are both decimal signs and separators in the `lines` of samples.
-    pub(super) fn ambiguous_commas(&self, lines: &[Line]) -> Option<(usize, String, String)> {
-        let count = self.names.len();
-        let rows: Vec<&Line> = lines.iter().filter(|(_, line)| has_fields(line)).take(ROWS).collect();
-        let is_ambiguous =
-            |line: &[u8]| is_row(line, b',') && !line.contains(&b'.') && split(line, b',').len() > count + 1;
-        let (number, line) = rows.first()?;
-        if self.separator != b',' || count < 2 || !rows.iter().all(|(_, line)| is_ambiguous(line)) {
-            return None;
-        }
-        let fields: Vec<String> = split(line, b',').into_iter().map(decoded).collect();
-        let fixed: Vec<String> = fields.chunks(2).map(|pair| pair.join(",")).collect();
-        let is_pairs = fields.len() == 2 * count;
-        let example = if is_pairs { format!("; this line is then `{}`", fixed.join(";")) } else { String::new() };
-        let message = format!(
-            "has {} numbers for {count} columns: a comma seems to be the decimal sign, and the separator, too",
-            fields.len()
-        );
-        let help = format!("export with semicolons or tabs between the columns, or with decimal points{example}");
-        Some((*number, message, help))
-    }
 }
 
 impl Shape {
@@ -310,7 +289,7 @@ impl Shape {
 /// Separators in the order in which they are tried. Apart from the comma, none of them occurs in a number.
 const SEPARATORS: [u8; 5] = [b'\t', b';', b'|', b',', BLANK];
 /// Any number of blanks and tabs.
-const BLANK: u8 = b' ';
+pub(super) const BLANK: u8 = b' ';
 
 /// The fields of a line, without blanks and quotation marks around them.
 pub(super) fn split(line: &[u8], separator: u8) -> Vec<&[u8]> {
@@ -419,6 +398,7 @@ mod tests {
             ("Sample Interval: 1000000 nsec", Some(1e-3)),
             ("Sample Interval: 1000 fortnights", None),
             ("Sample Interval,1e-3,ticks", None),
+            ("Sample Interval: 1,000 us", None),
         ] {
             assert_eq!(head(&format!("{line}\nX_Value\tA\n\t2\n")).interval, interval, "{line}");
         }

@@ -40,6 +40,7 @@ const TIME: &[Unit] = &[
     ("ms", 1e3),
     ("us", 1e6),
     ("ns", 1e9),
+    ("ps", 1e12),
     ("min", 1.0 / 60.0),
     ("h", 1.0 / 3600.0),
     ("d", 1.0 / 86_400.0),
@@ -67,7 +68,7 @@ const ANGLE: &[Unit] = &[
 const FORCE: &[Unit] =
     &[("N", 1.0), ("mN", 1e3), ("kN", 1e-3), ("lbf", 1.0 / 4.448_221_615_260_5), ("kgf", 1.0 / 9.806_65)];
 /// Units of the quantities of a record, by kind.
-const KINDS: [&[Unit]; 4] = [TIME, VOLTAGE, LENGTH, FORCE];
+const KINDS: [&[Unit]; 5] = [TIME, VOLTAGE, LENGTH, FORCE, ANGLE];
 
 /// Every quantity of a record.
 pub(crate) static QUANTITIES: [Quantity; 7] = [
@@ -121,6 +122,10 @@ impl Quantity {
     pub(crate) fn fits(&self, header: &str) -> Option<(Fit, f64)> {
         if header.eq_ignore_ascii_case(self.name) {
             return Some((Fit::Exact, 1.0));
+        }
+        // `-displacement (um)` has the other sign.
+        if header.starts_with(MINUS) {
+            return None;
         }
         let (name, unit) = parts(header);
         if self.name == "time_s" && plain(header) == X_VALUE {
@@ -197,12 +202,9 @@ fn per(units: &[Unit], unit: &str) -> Option<f64> {
 pub(crate) fn per_denominator(header: &str, denominator: &str) -> Result<f64, String> {
     let (Some(own), denominator) = (parts(header).1, unit(denominator)) else { return Ok(1.0) };
     match (kind(&own), kind(&denominator)) {
-        _ if denominator.is_empty() => Ok(1.0),
+        _ if denominator.is_empty() || own == denominator => Ok(1.0),
         (Some((a, own)), Some((b, other))) if a == b => Ok(own / other),
-        (Some(_), Some(_)) => Err(own),
-        (None, _) if own != denominator && own.chars().count() <= UNKNOWN && unit_in_brackets(header).is_some() => {
-            Err(own)
-        }
+        _ if own_unit(header).is_some() || has_unknown_unit(header) => Err(own),
         _ => Ok(1.0),
     }
 }
@@ -239,16 +241,22 @@ pub(crate) fn own_unit(header: &str) -> Option<&'static str> {
     KINDS.into_iter().flatten().map(|(name, _)| *name).find(|name| name.to_ascii_lowercase() == own)
 }
 
-/// Whether a header ends with brackets around what may be a unit, but none that is known, such as `Field (Oe)`.
+/// Whether a header ends with what may be a unit, but none that is known, such as `Field (Oe)` or `position_counts`.
 pub(crate) fn has_unknown_unit(header: &str) -> bool {
-    let is_short = |text: &String| (1..=UNKNOWN).contains(&text.chars().count()) && !text.contains([',', ':']);
-    unit_in_brackets(header).filter(is_short).is_some_and(|unit| kind(&unit).is_none() && unit.parse::<f64>().is_err())
+    let is_short = |text: &str| (1..=UNKNOWN).contains(&text.chars().count()) && !text.contains([',', ':']);
+    let is_word = |text: &str| FOREIGN.contains(&text);
+    let is_unknown = |text: &str| kind(text).is_none() && text.parse::<f64>().is_err();
+    match unit_in_brackets(header) {
+        Some(text) => is_unknown(&text) && (is_short(&text) || text.contains('/') || is_word(&text)),
+        None => parts(header).1.is_some_and(|text| is_word(&text)),
+    }
 }
 
-/// `name` with a unit that is stated beside it, if it is known and not that of the name.
+/// `name` with a unit that is stated beside it, if that is not the one of the name.
 pub(crate) fn with_unit(name: &str, stated: &str) -> String {
     let own = parts(name).1.filter(|_| own_unit(name).is_some() || has_unit(name));
-    if is_unit(stated) && own.is_none_or(|own| kind(&own).is_some() && own != unit(stated)) {
+    let is_stated = is_unit(stated) || has_unknown_unit(&format!("x [{stated}]"));
+    if is_stated && own.is_none_or(|own| kind(&own).is_some() && own != unit(stated)) {
         format!("{name} [{}]", stated.trim())
     } else {
         name.to_owned()
@@ -276,14 +284,19 @@ pub(crate) fn is_known(header: &str) -> bool {
     is_sample_number(header) || QUANTITIES.iter().any(|quantity| quantity.fits(header).is_some())
 }
 
-/// Whether a field of a line below the names is a unit.
+/// Whether a field of a line below the names is a unit, or one per s or s².
 pub(crate) fn is_unit(field: &str) -> bool {
     let unit = field.trim_matches(['[', ']', '(', ')']);
-    QUANTITIES.iter().chain(&COORDINATES).any(|quantity| quantity.per(unit).is_some())
+    let is_known = |unit: &str| QUANTITIES.iter().chain(&COORDINATES).any(|quantity| quantity.per(unit).is_some());
+    let mut endings = PER_TIME.iter().flat_map(|endings| *endings);
+    is_known(unit) || endings.any(|ending| unit.strip_suffix(ending).is_some_and(is_known))
 }
 
+/// What follows the unit of a rate, and that of an acceleration.
+pub(crate) const PER_TIME: [&[&str]; 2] = [&["/s"], &["/s^2", "/s2", "/s²", "/s/s"]];
+
 /// Lower case letters and digits of a name.
-pub(super) fn plain(name: &str) -> String {
+pub(crate) fn plain(name: &str) -> String {
     name.chars().filter(|c| c.is_alphanumeric()).flat_map(char::to_lowercase).collect()
 }
 
@@ -304,8 +317,13 @@ fn parts(header: &str) -> (String, Option<String>) {
 
 /// Units that are not those with a small letter.
 const MEGA: [&str; 4] = ["MN", "Mm", "Ms", "Mrad"];
-/// Most letters of a unit that is not known; longer texts in brackets are remarks.
+/// Most letters of a unit that is not known; longer texts in brackets are remarks, unless they are one of the next words.
 const UNKNOWN: usize = 4;
+/// Units of no quantity here, in or without brackets.
+const FOREIGN: [&str; 12] =
+    ["counts", "count", "ticks", "steps", "digits", "lsb", "percent", "%", "ft", "rpm", "mdeg", "oe"];
+/// Minus signs: of programs, of typesetting, and what some make of it.
+pub(super) const MINUS: [char; 3] = ['-', '\u{2212}', '\u{2013}'];
 
 fn unit(given: &str) -> String {
     // `Â` is the first half of a UTF-8 µ that was read as Latin-1.
@@ -315,8 +333,8 @@ fn unit(given: &str) -> String {
         "mn" | "mm" | "ms" | "mrad" if MEGA.contains(&given.trim()) => given.trim().to_owned(),
         "volt" | "volts" => "v".to_owned(),
         "sec" | "secs" | "second" | "seconds" => "s".to_owned(),
-        "msec" | "milliseconds" => "ms".to_owned(),
-        "usec" | "microseconds" => "us".to_owned(),
+        "msec" | "millisecond" | "milliseconds" => "ms".to_owned(),
+        "usec" | "microsec" | "microsecond" | "microseconds" => "us".to_owned(),
         "minute" | "minutes" => "min".to_owned(),
         "hr" | "hrs" | "hour" | "hours" => "h".to_owned(),
         "day" | "days" => "d".to_owned(),
@@ -369,6 +387,10 @@ mod tests {
             ("Position [in]", "displacement_um", Some((Fit::OtherName, 1.0 / 25_400.0))),
             ("Zeit in h", "time_s", Some((Fit::OtherName, 1.0 / 3600.0))),
             ("FORCE_mN", "force_N", Some((Fit::OtherUnit, 1e3))),
+            ("t_ps", "time_s", Some((Fit::OtherName, 1e12))),
+            ("Time [microsecond]", "time_s", Some((Fit::OtherUnit, 1e6))),
+            ("-displacement (um)", "displacement_um", None),
+            ("displacement_um [nm]", "displacement_um", None),
         ] {
             assert_eq!(quantity(name).unwrap().fits(header), expected, "{header}");
         }
@@ -378,6 +400,32 @@ mod tests {
         assert_eq!(per_denominator("CH2 (bar)", "V"), Err("bar".to_owned()));
         assert_eq!(per_denominator("CH2 (bar)", "bar"), Ok(1.0));
         assert_eq!(per_denominator("CH2 (Filtered)", "V"), Ok(1.0));
+        assert!(per_denominator("CH2 (mrad)", "rad").is_ok_and(|per| (per - 1e3).abs() < 1e-9));
+        assert_eq!(per_denominator("CH2 (V)", "count"), Err("v".to_owned()));
+        assert_eq!(per_denominator("V_in", "V"), Ok(1.0));
+        for (header, expected) in [
+            ("Field (Oe)", true),
+            ("vx (mm/s)", true),
+            ("position_counts", true),
+            ("Position (counts)", true),
+            ("Position [mV]", false),
+            ("Voltage (Filtered)", false),
+            ("Voltage_0", false),
+            ("CH (1)", false),
+        ] {
+            assert_eq!(has_unknown_unit(header), expected, "{header}");
+        }
+        for (name, stated, expected) in [
+            ("theta_x_urad", "mrad", "theta_x_urad [mrad]"),
+            ("theta_x_urad", "urad", "theta_x_urad"),
+            ("drive_V", "counts", "drive_V [counts]"),
+            ("drive_V", "Sequence", "drive_V"),
+            ("displacement_um", "um/s", "displacement_um [um/s]"),
+            ("vx", "um/s", "vx [um/s]"),
+            ("CH1", "0", "CH1"),
+        ] {
+            assert_eq!(with_unit(name, stated), expected, "{name}, {stated}");
+        }
         for (header, unit) in [
             ("CH2 (mV)", Some("mV")),
             ("Pos,nm", Some("nm")),

@@ -1,15 +1,24 @@
 //! Numbers in the fields of a file, and times of day.
 
+use super::names::MINUS;
+
+/// What instruments write for infinity and for no number (SCPI).
+const OVERFLOW: [f64; 2] = [9.9e37, 9.91e37];
+
 /// A number with its decimal sign, if it has one.
 pub(super) fn number(field: &str, separator: u8) -> Option<(f64, Option<char>)> {
-    if let Ok(value) = field.parse() {
+    if let Ok(value) = field.parse::<f64>() {
+        let value = if OVERFLOW.contains(&value.abs()) { value * f64::INFINITY } else { value };
         return Some((value, field.contains('.').then_some('.')));
+    }
+    if field.contains(&MINUS[1..]) {
+        return number(&field.replace(MINUS, "-"), separator);
     }
     let other = match field {
         "∞" | "+∞" => Some(f64::INFINITY),
         "-∞" => Some(f64::NEG_INFINITY),
         // Fortran's exponents.
-        _ => clock(field).map(|(_, seconds)| seconds).or_else(|| field.replace(['D', 'd'], "e").parse().ok()),
+        _ => clock(field).map(|clock| clock.seconds).or_else(|| field.replace(['D', 'd'], "e").parse().ok()),
     };
     if let Some(value) = other {
         return Some((value, None));
@@ -20,8 +29,16 @@ pub(super) fn number(field: &str, separator: u8) -> Option<(f64, Option<char>)> 
     field.replace(',', ".").parse().ok().map(|value| (value, Some(',')))
 }
 
-/// A time of day: its day, if it has a date, and seconds since midnight.
-pub(super) type Clock = (Option<i32>, f64);
+/// A time of day.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Clock {
+    /// Since midnight, s.
+    seconds: f64,
+    /// Number of its day, if it has a date that says it.
+    day: Option<i32>,
+    /// The date and the time zone as they are written.
+    date: [String; 2],
+}
 
 /// The time of day in `10:11:12.5`, `2024-03-05T10:11:12,5Z` or `3/5/2024 10:11:12 PM`. Two numbers are minutes and
 /// seconds if these have decimals.
@@ -35,7 +52,7 @@ pub(super) fn clock(text: &str) -> Option<Clock> {
     };
     // Behind the date, without the time zone.
     let (date, time) = text.rsplit_once(['t', ' ']).unwrap_or(("", text));
-    let time = time.split(['+', '-']).next()?;
+    let (time, zone) = time.split_at(time.find(['+', '-']).unwrap_or(time.len()));
     let mut parts = time.rsplit(':');
     let seconds = parts.next().filter(|part| part.starts_with(|c: char| c.is_ascii_digit()))?;
     let minutes: u32 = parts.next()?.parse().ok()?;
@@ -51,7 +68,11 @@ pub(super) fn clock(text: &str) -> Option<Clock> {
         (hours, _) => hours,
     };
     let is_time = is_time && hours < 24 && minutes < 60 && seconds < 60.0;
-    is_time.then(|| (day(date), f64::from(3600 * hours + 60 * minutes) + seconds))
+    is_time.then(|| Clock {
+        seconds: f64::from(3600 * hours + 60 * minutes) + seconds,
+        day: day(date),
+        date: [date, zone].map(str::to_owned),
+    })
 }
 
 /// Number of the day `2024-03-05` or `5.3.2024`; none for `3/5/2024`, in which day and month may have either order.
@@ -70,24 +91,39 @@ fn day(date: &str) -> Option<i32> {
 /// Times since the first one of a column.
 pub(super) struct SinceFirst {
     first: Clock,
-    /// Seconds since midnight of the last one, and midnights since the first.
-    last: f64,
+    last: Clock,
+    /// Since the first.
     midnights: f64,
 }
 
 impl SinceFirst {
-    pub(super) const fn new(first: Clock) -> Self {
-        Self { first, last: first.1, midnights: 0.0 }
+    pub(super) fn new(first: Clock) -> Self {
+        Self { last: first.clone(), first, midnights: 0.0 }
     }
 
-    /// Seconds from the first time to this one. Without a date, a time that falls by half a day is behind midnight.
-    pub(super) fn seconds(&mut self, (day, seconds): Clock) -> f64 {
-        if seconds < self.last - 0.5 * DAY {
-            self.midnights += 1.0;
+    /// Seconds from the first time to this one. Without a day, a time that falls by half a day is behind midnight. None if
+    /// the zone changes, or a date that does not say its day does so at another time than midnight.
+    pub(super) fn seconds(&mut self, clock: Clock) -> Option<f64> {
+        let is_behind_midnight = clock.seconds < self.last.seconds - 0.5 * DAY;
+        self.midnights += f64::from(u8::from(is_behind_midnight));
+        let days = clock.day.zip(self.first.day).map(|(day, first)| f64::from(day - first));
+        let [has_other_date, has_other_zone] = [0, 1].map(|k| clock.date[k] != self.last.date[k]);
+        let is_unknown = has_other_zone || days.is_none() && has_other_date && !is_behind_midnight;
+        let seconds = days.unwrap_or(self.midnights) * DAY + (clock.seconds - self.first.seconds);
+        self.last = clock;
+        (!is_unknown).then_some(seconds)
+    }
+}
+
+impl Clock {
+    /// With the dates of columns of their own, of which one says its day.
+    pub(super) fn with_dates(mut self, dates: &[&[u8]]) -> Self {
+        let text = |date: &&[u8]| String::from_utf8_lossy(date).into_owned();
+        if let [date] = dates {
+            self.day = self.day.or_else(|| day(&text(date)));
         }
-        self.last = seconds;
-        let days = day.zip(self.first.0).map_or(self.midnights, |(day, first)| f64::from(day - first));
-        days * DAY + (seconds - self.first.1)
+        self.date[0].extend(dates.iter().map(text));
+        self
     }
 }
 
@@ -115,12 +151,51 @@ mod tests {
         assert_eq!(number("1,5", b','), None);
     }
 
+    /// Pairs of times, with the seconds between them if these are known.
+    #[test]
+    fn times_between_dates_are_known_or_refused() {
+        for (first, next, expected) in [
+            ("23:59:59", "00:00:01", Some(2.0)),
+            ("2024-03-04 10:00:00", "2024-03-07 09:00:00", Some(2.5e5 + 5600.0)),
+            ("3/4/2024 23:59:59", "3/5/2024 0:00:01", Some(2.0)),
+            ("3/4/2024 10:00:00", "3/4/2024 10:00:02", Some(2.0)),
+            ("3/4/2024 10:00:00", "3/5/2024 10:00:02", None),
+            ("4-Mar-2024 10:00:00", "5-Mar-2024 10:00:02", None),
+            ("2024-03-31T01:59:59+01:00", "2024-03-31T03:00:01+02:00", None),
+            ("2024-03-31T01:59:59+01:00", "2024-03-31T02:00:01+01:00", Some(2.0)),
+        ] {
+            let [first, next] = [first, next].map(|text| clock(text).unwrap());
+            assert_eq!(SinceFirst::new(first).seconds(next), expected, "{expected:?}");
+        }
+        let dated = |time: &str, dates: &[&[u8]]| clock(time).unwrap().with_dates(dates);
+        for (dates, expected) in [
+            ([&b"2024-03-04"[..], b"2024-03-06"], Some(172_802.0)),
+            ([b"3/4/2024", b"3/6/2024"], None),
+            ([b"3/4/2024", b"3/4/2024"], Some(2.0)),
+        ] {
+            let mut since = SinceFirst::new(dated("10:00:00", &dates[..1]));
+            assert_eq!(since.seconds(dated("10:00:02", &dates[1..])), expected);
+        }
+    }
+
+    #[test]
+    fn minus_signs_of_typesetting_and_marks_of_instruments_are_known() {
+        for (text, value) in [("\u{2212}0.5", -0.5), ("\u{2013}2e\u{2212}3", -2e-3), ("-9.9E+37", f64::NEG_INFINITY)] {
+            assert_eq!(number(text, b',').map(|(value, _)| value), Some(value), "{text}");
+        }
+        assert!(number("9.91E+37", b',').is_some_and(|(value, _)| value.is_infinite()));
+        for bad in ["\u{2013}", "1\u{2013}2", "0x1f", "1'234.5", "1 234", "1.234.567", "1\u{202f}234", "5 %"] {
+            assert_eq!(number(bad, b';'), None, "{bad}");
+        }
+    }
+
     #[test]
     fn times_of_day_are_seconds() {
         for (text, seconds) in [
             ("10:11:12.5", 36_672.5),
             ("2024-03-05T10:11:12,5Z", 36_672.5),
             ("2024-03-05 10:11:12.5+01:00", 36_672.5),
+            ("10:11:12-0500", 36_672.0),
             ("3/5/2024 10:11:12 PM", 79_872.0),
             ("12:00:01 am", 1.0),
             ("11:12.5", 672.5),
@@ -130,9 +205,9 @@ mod tests {
         for bad in ["10:11", "25:00:00", "10:61:00", "1:2:3:4", "a:b:c", "::", "10:11:-5"] {
             assert_eq!(number(bad, b','), None, "{bad}");
         }
-        let days = ["2024-02-28", "29.2.2024", "2024/03/01"].map(|date| clock(&format!("{date} 0:00:00")).unwrap().0);
+        let days = ["2024-02-28", "29.2.2024", "2024/03/01"].map(|date| clock(&format!("{date} 0:00:00")).unwrap().day);
         assert_eq!(days.map(|day| day.unwrap() - days[0].unwrap()), [0, 1, 2]);
-        assert_eq!(clock("3/5/2024 0:00:00"), Some((None, 0.0)));
+        assert_eq!(clock("3/5/2024 0:00:00").unwrap().day, None);
         assert!(is_date(b"2024-03-05") && is_date(b"5.3.2024") && !is_date(b"1-2") && !is_date(b"1.2.x"));
     }
 }

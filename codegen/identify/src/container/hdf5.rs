@@ -55,7 +55,9 @@ fn add(group: &Group, path: &str, depth: usize, left: &mut Left, contents: &mut 
                 let name = with_unit(&name, unit.unwrap_or_default());
                 contents.add(Array { group: path.to_owned(), name, size, values }, form);
             }
-            None => contents.others.push((name, "no array of numbers that can be read".to_owned())),
+            None => {
+                contents.others.push((name, "no array of numbers that can be read, or one with a scale".to_owned()))
+            }
         }
     }
     // Names of MATLAB's internal objects begin so.
@@ -94,7 +96,9 @@ fn is_long(name: &str, contents: &mut Contents) -> bool {
 fn numbers(data: &Dataset, left: &mut Left) -> Option<(Vec<usize>, Vec<f64>)> {
     let attributes = data.attrs().ok()?;
     let class = attributes.get("MATLAB_class").and_then(AttrValue::as_str);
-    if class.is_some_and(|class| NO_NUMBERS.contains(&class)) {
+    // Of packed numbers the scale is an attribute.
+    let is_packed = ["scale_factor", "add_offset"].iter().any(|name| attributes.contains_key(*name));
+    if is_packed || class.is_some_and(|class| NO_NUMBERS.contains(&class)) {
         return None;
     }
     // The last dimension varies fastest.
@@ -138,14 +142,19 @@ mod tests {
         count.set_attr("units", AttrValue::AsciiString("mV".into()));
         let drive = outer.create_dataset("drive_V").with_i32_data(&[7]);
         drive.set_attr("units", AttrValue::AsciiString("mV".into()));
+        let counts = outer.create_dataset("force_N").with_i32_data(&[7]);
+        counts.set_attr("units", AttrValue::AsciiString("counts".into()));
+        let packed = outer.create_dataset("packed").with_i32_data(&[7]);
+        packed.set_attr("scale_factor", AttrValue::F64(0.5));
         let time = outer.create_dataset("time_s").with_i32_data(&[7]);
         time.set_attr("units", AttrValue::AsciiString("sec".into()));
         outer.create_dataset("matrix").with_f64_data(&[1.0, 2.0, 3.0, 4.0, 5.0, 6.0]).with_shape(&[3, 2]);
         builder.add_group(outer.finish());
         let found = contents(builder.finish().unwrap(), u64::MAX).unwrap();
         let arrays: Vec<_> = found.arrays.iter().map(|a| (a.group.as_str(), a.name.as_str(), &a.size[..])).collect();
-        let units = ["count [mV]", "drive_V [mV]", "time_s"].map(|name| ("scan", name, &[1][..]));
+        let units = ["count [mV]", "drive_V [mV]", "force_N [counts]", "time_s"].map(|name| ("scan", name, &[1][..]));
         assert_eq!(arrays, [&units[..], &[("scan", "matrix", &[2, 3])]].concat());
-        assert_eq!(found.others, [("operator".to_owned(), "no array of numbers that can be read".to_owned())]);
+        let reason = "no array of numbers that can be read, or one with a scale".to_owned();
+        assert_eq!(found.others, [("operator".to_owned(), reason.clone()), ("packed".to_owned(), reason)]);
     }
 }

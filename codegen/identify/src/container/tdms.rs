@@ -6,6 +6,7 @@ use std::collections::BTreeMap;
 use super::bytes::{Bytes, DAMAGED, MOST_ARRAYS, Refusal, Space};
 use super::{Array, Contents};
 use crate::columns::decoded;
+use crate::columns::names::with_unit;
 
 /// What a segment has.
 const OBJECTS: u32 = 1 << 1;
@@ -22,6 +23,8 @@ const LONGEST_PATH: usize = 1024;
 /// A channel, a group, or the file.
 struct Object<'a> {
     path: &'a [u8],
+    /// Its property `unit_string`.
+    unit: &'a [u8],
     kind: u32,
     /// Bytes of all its values in a chunk.
     size: usize,
@@ -51,7 +54,7 @@ impl<'a> Objects<'a> {
     fn place(&mut self, path: &'a [u8]) -> usize {
         let place = *self.places.entry(path).or_insert(self.all.len());
         if place == self.all.len() {
-            self.all.push(Object { path, kind: TEXT, size: 0, values: Vec::new(), order: None });
+            self.all.push(Object { path, unit: b"", kind: TEXT, size: 0, values: Vec::new(), order: None });
         }
         place
     }
@@ -142,8 +145,12 @@ fn read_objects<'a>(mut from: Bytes<'a>, objects: &mut Objects<'a>) -> Result<()
             match from.word()? {
                 TEXT => {
                     let value = text(&mut from)?;
-                    if name == b"NI_Scaling_Status" && value == b"unscaled" {
-                        return Err("its channels are raw numbers of the acquisition: save them scaled".to_owned());
+                    match name {
+                        b"NI_Scaling_Status" if value == b"unscaled" => {
+                            return Err("its channels are raw numbers of the acquisition: save them scaled".to_owned());
+                        }
+                        b"unit_string" => objects.all[place].unit = value,
+                        _ => {}
                     }
                 }
                 kind => {
@@ -236,12 +243,12 @@ pub(super) fn contents(file: &[u8], limit: u64) -> Result<Contents, Refusal> {
     if cut > 0 {
         contents.others.push(("last values".to_owned(), format!("{cut} bytes without those of the other channels")));
     }
-    for Object { path, kind, values, .. } in objects.all {
+    for Object { path, unit, kind, values, .. } in objects.all {
         // The path of a channel is `/'group'/'channel'`, with quotes in names doubled.
         let path = decoded(path);
         let Some((group, name)) = path.rsplit_once("'/'") else { continue };
         let plain = |name: &str| name.trim_start_matches("/'").trim_end_matches('\'').replace("''", "'");
-        let (group, name) = (plain(group), plain(name));
+        let (group, name) = (plain(group), with_unit(&plain(name), &decoded(unit)));
         match form(kind) {
             Some(form) => contents.add(Array { group, name, size: vec![values.len()], values }, form),
             None => contents.others.push((name, "no array of numbers".to_owned())),
@@ -279,13 +286,16 @@ mod tests {
     fn channels_that_are_not_scaled_are_refused() {
         let word = |value: u32| value.to_le_bytes().to_vec();
         let text = |text: &str| [word(text.len() as u32), text.as_bytes().to_vec()].concat();
-        let property = |status: &str| [text("NI_Scaling_Status"), word(TEXT), text(status)].concat();
-        let read = |status: &str| {
-            let object = [word(1), text("/'scan'/'a'"), word(u32::MAX), word(1), property(status)].concat();
-            read_objects(Bytes { rest: &object, is_big_endian: false }, &mut Objects::default())
+        let read = |name: &str, value: &str| {
+            let property = [text(name), word(TEXT), text(value)].concat();
+            let object = [word(1), text("/'scan'/'a'"), word(u32::MAX), word(1), property].concat();
+            let mut objects = Objects::default();
+            read_objects(Bytes { rest: &object, is_big_endian: false }, &mut objects)?;
+            Ok::<_, String>(decoded(objects.all[0].unit))
         };
-        assert_eq!(read("scaled"), Ok(()));
-        assert!(read("unscaled").unwrap_err().contains("save them scaled"));
+        assert_eq!(read("NI_Scaling_Status", "scaled"), Ok(String::new()));
+        assert_eq!(read("unit_string", "mV"), Ok("mV".to_owned()));
+        assert!(read("NI_Scaling_Status", "unscaled").unwrap_err().contains("save them scaled"));
     }
 
     /// A minute, if each segment looked at all channels.

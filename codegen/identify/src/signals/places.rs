@@ -1,7 +1,7 @@
 //! Assigns the columns of a file: by the user's choice, otherwise by their names.
 
 use super::{ColumnSpec, TIME};
-use crate::columns::names::{self, Conversion, Quantity};
+use crate::columns::names::{self, Conversion, Fit, Quantity};
 use crate::columns::{Column, Head, Shape};
 use crate::findings::Findings;
 use crate::reading::{ColumnChoice, Reading};
@@ -69,7 +69,7 @@ struct Search<'a> {
 }
 
 impl Search<'_> {
-    /// The column of the quantity `name`, if there is one; two that fit equally well are a problem.
+    /// The column of the quantity `name`, if there is one; two are a problem, unless one has just that name.
     fn place(&self, name: &'static str) -> Result<Option<Column<'static>>, Problem> {
         if let Some(choice) = self.reading.column(name) {
             return self.chosen(choice, name).map(Some);
@@ -79,9 +79,9 @@ impl Search<'_> {
         let mut found: Vec<_> = self.header.names.iter().enumerate().filter_map(fits).collect();
         found.sort_by_key(|(fit, ..)| *fit);
         match found[..] {
-            [(first, a, _), (second, b, _), ..] if first == second => {
+            [(first, a, _), (second, b, _), ..] if first == second || first != Fit::Exact => {
                 let message = format!("column `{name}` appears twice, as columns {} and {}", a + 1, b + 1);
-                let help = format!("keep one of them, or give `--columns {name}={}`", a + 1);
+                let help = format!("keep one of them, or give `--columns {}`", shell::quoted(&self.entry(name, a)));
                 Err((codes::RECORD_COLUMN_TWICE, message, help))
             }
             [(_, at, per), ..] => Ok(Some(Column { at, name, conversion: Conversion::unit(per) })),
@@ -92,6 +92,7 @@ impl Search<'_> {
 
     /// The column that the user chose. Its name may look like a number or like a scale.
     fn chosen(&self, choice: &ColumnChoice, name: &'static str) -> Result<Column<'static>, Problem> {
+        self.check_name(choice)?;
         self.check_unit(choice)?;
         let plain = choice.conversion.and_then(|conversion| Some((self.at(&choice.column)?, conversion)));
         if let Some((at, conversion)) = plain {
@@ -112,45 +113,73 @@ impl Search<'_> {
         Ok(Column { at, name, conversion: Conversion { per, ..scaled.conversion } })
     }
 
-    /// The column that the user gives another unit than its header does, and that of the header.
-    fn other_unit(&self, choice: &ColumnChoice) -> Option<(usize, &'static str)> {
+    /// Refuses a name that several columns have.
+    fn check_name(&self, choice: &ColumnChoice) -> Result<(), Problem> {
+        let scaled = choice.scaled.as_ref().map(|scaled| scaled.column.as_str());
+        for name in [choice.column.as_str()].into_iter().chain(scaled) {
+            let [first, second, ..] = self.named(name)[..] else { continue };
+            let message = format!("`{name}` is the name of columns {} and {}", first + 1, second + 1);
+            let help = format!("name it by its number: write {} in place of `{name}`", first + 1);
+            return Err((codes::RECORD_COLUMN_TWICE, message, help));
+        }
+        Ok(())
+    }
+
+    /// The column that the user gives another unit than its header does, and that of the header; none of the two if it is
+    /// not known.
+    fn other_unit(&self, choice: &ColumnChoice) -> Option<(usize, Option<&'static str>)> {
         let named = choice.conversion.and_then(|conversion| Some((self.at(&choice.column)?, conversion.per)));
         let scaled = choice.scaled.as_ref().filter(|scaled| named.is_none() && scaled.denominator.is_none());
         let (at, given) = named.or_else(|| scaled.and_then(|scaled| Some((self.at(&scaled.column)?, scaled.per))))?;
-        let unit = names::own_unit(self.header.names.get(at)?)?;
-        let per = names::quantity(choice.quantity)?.per(unit);
+        let (header, quantity) = (self.header.names.get(at)?, names::quantity(choice.quantity)?);
+        let Some(unit) = names::own_unit(header) else {
+            return (scaled.is_none() && names::has_unknown_unit(header)).then_some((at, None));
+        };
+        let per = quantity.per(unit);
         // A factor may be per unit of another kind.
-        (per != Some(given) && (per.is_some() || scaled.is_none())).then_some((at, unit))
+        (per != Some(given) && (per.is_some() || scaled.is_none())).then_some((at, Some(unit)))
     }
 
     fn check_unit(&self, choice: &ColumnChoice) -> Result<(), Problem> {
         let Some((at, unit)) = self.other_unit(choice) else { return Ok(()) };
         let (header, name) = (&self.header.names[at], choice.quantity);
-        let message = format!("`--columns` names `{header}` for `{name}`, but its unit is {unit}");
+        let shown = unit.unwrap_or("not known");
+        let message = format!("`--columns` names `{header}` for `{name}`, but its unit is {shown}");
         // Every entry with the unit of its column.
         let with_unit = |choice: &ColumnChoice| {
             self.other_unit(choice).map_or_else(|| choice.text.clone(), |(at, _)| self.entry(choice.quantity, at))
         };
         let all: Vec<String> = self.reading.chosen().map(with_unit).collect();
-        let rest = match names::quantity(name).and_then(|quantity| quantity.per(unit)) {
+        let rest = match names::quantity(name).and_then(|quantity| quantity.per(unit?)) {
             None => " with the size of its unit in place of 1".to_owned(),
-            Some(_) if self.at(&choice.column).is_none() => format!(", followed by scale and offset in {unit}"),
+            Some(_) if self.at(&choice.column).is_none() => format!(", followed by scale and offset in {shown}"),
             Some(_) => String::new(),
         };
         let help = format!("give `--columns {}`{rest}", shell::quoted(&all.join(",")));
         Err((codes::RECORD_HEADER, message, help))
     }
 
-    /// The place of the column with this name, or else this number.
+    /// The places of the columns with this name: as written, or in other letters, or without a unit, which may come from
+    /// another line.
+    fn named(&self, column: &str) -> Vec<usize> {
+        let is_named: [fn(&str, &str) -> bool; 3] = [
+            |header, column| header == column,
+            |header, column| header.eq_ignore_ascii_case(column),
+            |header, column| header.rsplit_once(" [").is_some_and(|(name, _)| name.eq_ignore_ascii_case(column)),
+        ];
+        let places = |is: &fn(&str, &str) -> bool| -> Vec<usize> {
+            let names = self.header.names.iter().enumerate();
+            names.filter(|(_, header)| is(header, column)).map(|(at, _)| at).collect()
+        };
+        is_named.iter().map(places).find(|places| !places.is_empty()).unwrap_or_default()
+    }
+
+    /// The place of the first column with this name, or else this number.
     fn at(&self, column: &str) -> Option<usize> {
         let names = &self.header.names;
-        let place = |of: fn(&str) -> &str| names.iter().position(|header| of(header).eq_ignore_ascii_case(column));
-        // The unit may come from another line.
-        let named =
-            place(|header| header).or_else(|| place(|header| header.rsplit_once(" [").map_or(header, |it| it.0)));
         let numbered = || column.parse::<usize>().ok().and_then(|number| number.checked_sub(1));
         // In a file without names, any line shows whether it is long enough.
-        named.or_else(|| numbered().filter(|at| names.is_empty() || *at < names.len()))
+        self.named(column).first().copied().or_else(|| numbered().filter(|at| names.is_empty() || *at < names.len()))
     }
 
     /// Time between samples, s, if time is computed.
@@ -182,7 +211,9 @@ impl Search<'_> {
     /// What the header has.
     fn present(&self) -> String {
         let names: Vec<&str> = self.header.names.iter().map(String::as_str).collect();
-        if names.is_empty() {
+        if let Some([names, columns]) = self.header.unfit {
+            format!("the header has {names} names for {columns} columns")
+        } else if names.is_empty() {
             "the file begins with numbers".to_owned()
         } else {
             format!("the header has {}", listed(&names))
@@ -274,7 +305,7 @@ impl Search<'_> {
         let names = &self.header.names;
         let is_plain = |name: &&String| {
             let is_trimmed = !name.is_empty() && name.trim() == name.as_str();
-            is_trimmed && !name.contains(['=', '`', '\'', '\n']) && self.at(name) == Some(at)
+            is_trimmed && !name.contains(['=', '`', '\'', '\n']) && self.named(name) == [at]
         };
         names.get(at).filter(is_plain).cloned().unwrap_or_else(|| (at + 1).to_string())
     }
@@ -372,7 +403,8 @@ mod tests {
             ("X_Value,Voltage,Weg\n0,0,0\n1,1,0\n2,0,0\n", "`--columns drive_V=Voltage,displacement_um=Weg`"),
             (",0,1,2\n", "`--columns time_s=2,drive_V=3,displacement_um=4`"),
             ("\u{a0}a;U;y\n0;1;2\n", "`--columns time_s=1,drive_V=U,displacement_um=y`"),
-            (";a;a;x=1\n7;1;2;3\n", "`--columns time_s=1,drive_V=a,displacement_um=3`"),
+            (";a;a;x=1\n7;1;2;3\n", "`--columns time_s=1,drive_V=2,displacement_um=3`"),
+            ("row,names\n1,0.5,5.5,2.5\n", "`--columns time_s=1,drive_V=2,displacement_um=3`"),
             ("a,b\n1,2\n", "`--columns drive_V=a,displacement_um=b --rate HZ`"),
             ("sample,a,b\n0,1,2\n", "`--columns drive_V=a,displacement_um=b --rate HZ`"),
             ("time_s,drive_V,displacement_ft\n0,1,2\n", "`--columns 'displacement=displacement_ft*1 um'`"),

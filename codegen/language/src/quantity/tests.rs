@@ -267,3 +267,22 @@ fn every_offered_unit_is_a_unit() {
         );
     }
 }
+
+#[test]
+fn only_three_digits_behind_a_sign_may_follow_thousands() {
+    for (text, sign, expected) in [
+        ("21,484", ',', true),
+        ("-1,000", ',', true),
+        ("\u{2212}999.999", '.', true),
+        ("0,484", ',', false),
+        ("21,48", ',', false),
+        ("21,4840", ',', false),
+        ("1234,567", ',', false),
+        ("21.484", ',', false),
+        ("1,234,567", ',', false),
+        ("1,234e3", ',', false),
+        (",484", ',', false),
+    ] {
+        assert_eq!(may_divide_thousands(text, sign), expected, "{text}");
+    }
+}

@@ -94,6 +94,14 @@ fn joints(text: &str) -> Result<[[[f64; 3]; 6]; 2], Refusal> {
     }
     // Beside decimal points a comma would divide thousands.
     head.has_commas = head.separator != ',' && !lines.clone().any(|(_, line)| line.contains('.'));
+    let coordinates = lines.clone().flat_map(|(line, text)| head.coordinates_of(text).map(|cell| (line, cell)));
+    let mut commas = coordinates.filter(|(_, cell)| head.has_commas && cell.contains(','));
+    if let Some((line, cell)) = commas.clone().next()
+        && commas.all(|(_, cell)| quantity::may_divide_thousands(cell, ','))
+    {
+        let message = format!("the comma of `{}` may divide thousands or begin the decimals", text::shorten(cell));
+        return refuse(line, message, "write decimal points, and nothing between thousands");
+    }
     let mut found = lines.map(|(line, text)| head.joint(line, text)).collect::<Result<Vec<Joint>, Refusal>>()?;
     if found.len() != 12 {
         let message = format!("there are {} joints, expected 12", found.len());
@@ -160,16 +168,28 @@ impl<'a> Head<'a> {
         let called =
             |known: &[&str]| known.iter().find_map(|one| names.iter().position(|name| name.to_lowercase() == *one));
         let coordinate = |axis: char| {
-            let found = names.iter().enumerate().find_map(|(at, name)| {
+            let mut found = names.iter().enumerate().filter_map(|(at, name)| {
                 let unit = name.strip_prefix([axis, axis.to_ascii_uppercase()])?;
                 let is_name = !unit.starts_with(char::is_alphanumeric);
                 let plain = |unit: &'a str| unit.trim_matches(|c: char| c.is_whitespace() || "_[]()/,.".contains(c));
                 let below = units.get(at).copied().unwrap_or_default();
-                is_name.then(|| (at, [unit, below].map(plain).into_iter().find(|unit| !unit.is_empty()).unwrap_or("")))
+                is_name.then(|| (at, [unit, below].map(plain)))
             });
             let head = format!("write the names and the unit in the first line: {EXAMPLE}");
-            let Some((at, unit)) = found else {
+            let Some((at, both)) = found.next() else {
                 return refuse(line, format!("there is no column {axis}"), head);
+            };
+            if let Some((second, _)) = found.next() {
+                let message = format!("the columns {} and {} are both {axis}", at + 1, second + 1);
+                return refuse(line, message, "delete one of them");
+            }
+            let unit = match both {
+                ["", unit] | [unit, ""] => unit,
+                [name, below] if name == below => name,
+                [name, below] => {
+                    let message = format!("the unit of {axis} is {name} in its name, and {below} in the line of units");
+                    return refuse(line, message, "keep the right one of the two");
+                }
             };
             if quantity::parse_as(&format!("1 {unit}"), Dimension::LENGTH)
                 .is_ok_and(|one| one.dimension == Dimension::LENGTH)
@@ -181,6 +201,12 @@ impl<'a> Head<'a> {
         let coordinates = [coordinate('x')?, coordinate('y')?, coordinate('z')?];
         let (leg, body, count) = (called(LEGS), called(BODIES), names.len());
         Ok(Self { separator, leg, body, coordinates, count, has_commas: false })
+    }
+
+    /// The texts of the coordinates.
+    fn coordinates_of<'t>(&self, text: &'t str) -> [&'t str; 3] {
+        let cells = cells(text, self.separator);
+        self.coordinates.map(|(at, _)| cells.get(at).copied().unwrap_or_default())
     }
 
     fn joint(&self, line: usize, text: &str) -> Result<Joint, Refusal> {
@@ -272,6 +298,7 @@ mod tests {
         for (what, text) in [
             ("from 1", file(EXAMPLE, 1, |leg, top, [x, y, z]| format!("{leg},{},{x},{y},{z}", body(top)))),
             ("reversed, Windows", turned(plain())),
+            ("units twice", plain().replacen('\n', "\n,,mm,mm,mm\n", 1)),
             ("without legs and bodies", file("x (mm),y (mm),z (mm)", 0, |_, _, [x, y, z]| format!("{x},{y},{z}"))),
             (
                 "names",
@@ -338,6 +365,9 @@ mod tests {
             (plain.replace("0,base,150", "0,base,150,5"), Some(2), "more cells than"),
             (plain.replace("0,base,150", "0,base,\"150,5\""), Some(2), "more cells than"),
             (plain.replace(',', ";").replace("0;base;150", "0;base;1,234"), Some(2), "`1,234` is no coordinate"),
+            (plain.replacen('\n', "\n,,m,m,m\n", 1), Some(1), "the unit of x is mm in its name, and m in the line"),
+            (plain.replacen("z_mm", "x_m,z_mm", 1), Some(1), "the columns 3 and 5 are both x"),
+            (file("x_mm;y_mm;z_mm", 0, |_, _, _| "1,234;5;6".to_owned()), Some(2), "the comma of `1,234` may divide"),
             (without_last, None, "there are 11 joints"),
         ] {
             let refused = joints(&text).err().unwrap_or_else(|| panic!("{text}"));
