@@ -1,5 +1,6 @@
 //! Tests that cross crates, in one binary: a module for each subject.
 
+mod assembled;
 mod bit_identity;
 mod board_link;
 mod board_support;

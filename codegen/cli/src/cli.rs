@@ -14,6 +14,7 @@ macro_rules! options {
 mod build;
 mod cache;
 mod check;
+mod commission;
 mod completions;
 mod design;
 mod doctor;
@@ -135,6 +136,9 @@ enum Command {
     Reproduce(reproduce::Arguments),
     /// Processor in the loop: control a simulated machine with a microcontroller, emulated or at a serial port.
     Pil(pil::Arguments),
+    /// Identify a wired machine with its own converters, write its spec, and verify it: wiring check, cross-talk, reversal curves,
+    /// leg models, acceptance. An interrupted commissioning continues where it stopped.
+    Commission(commission::Arguments),
     /// Operate a machine over the link: arm, run, set-points, settings, waves, records; from a script or line by line.
     Operate(operate::Arguments),
     /// Show and operate a machine in the browser: pose, strip charts, spectrum, events. One page is in control at a time.
@@ -269,6 +273,7 @@ fn perform(cli: &Cli, matches: &ArgMatches, ui: &mut Ui) -> Result<(), Failure> 
         Some(Command::Report(arguments)) => report::run(arguments, ui),
         Some(Command::Reproduce(arguments)) => reproduce::run(arguments, ui),
         Some(Command::Pil(arguments)) => pil::run(arguments, ui),
+        Some(Command::Commission(arguments)) => commission::run(arguments, ui),
         Some(Command::Operate(arguments)) => operate::run(arguments, ui),
         Some(Command::Panel(arguments)) => panel::run(arguments, ui),
         Some(Command::Gcs(arguments)) => gcs::run(arguments, ui),

@@ -8,7 +8,7 @@ use std::os::unix::fs::{PermissionsExt, symlink};
 
 use crate::support::{Document, Folder, Run, cases, repository};
 
-const COMMANDS: [&str; 21] = [
+const COMMANDS: [&str; 22] = [
     "check",
     "build",
     "size",
@@ -20,6 +20,7 @@ const COMMANDS: [&str; 21] = [
     "report",
     "reproduce",
     "pil",
+    "commission",
     "operate",
     "gcs",
     "replay",

@@ -36,6 +36,7 @@ const LINES: &[(&str, &[(&str, &str)])] = &[
     ("specgen report", &[("spec", "legs.toml")]),
     ("specgen reproduce", &[]),
     ("specgen pil", &[("spec", "legs.toml")]),
+    ("specgen commission", &[("spec", "reference.toml"), ("socket", "none"), ("yes", "")]),
     ("specgen operate", &[("socket", "none")]),
     ("specgen panel", &[("socket", "none"), ("spec", "legs.toml")]),
     ("specgen gcs", &[("socket", "none")]),

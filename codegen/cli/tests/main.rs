@@ -7,6 +7,7 @@ mod assumed;
 mod board_support;
 mod build_cache;
 mod cli;
+mod commission;
 mod documents;
 mod dynamics_command;
 mod examples;

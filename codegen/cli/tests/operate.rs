@@ -16,8 +16,8 @@ use controller::supervised::Phase;
 use specgen_link::client::Port;
 
 /// A board at a socket.
-struct SocketBoard {
-    path: PathBuf,
+pub struct SocketBoard {
+    pub path: PathBuf,
     /// Phase of the machine, for the test.
     phase: Arc<AtomicU32>,
     /// Set to make the converters fail.
@@ -26,7 +26,7 @@ struct SocketBoard {
 }
 
 impl SocketBoard {
-    fn new(folder: &Folder) -> Self {
+    pub fn new(folder: &Folder) -> Self {
         let path = folder.path("board.sock");
         let listener = UnixListener::bind(&path).unwrap();
         listener.set_nonblocking(true).unwrap();
@@ -36,7 +36,7 @@ impl SocketBoard {
         Self { path, phase, fails, _serves: serves }
     }
 
-    fn is(&self, phase: Phase) -> bool {
+    pub fn is(&self, phase: Phase) -> bool {
         u64::from(self.phase.load(Ordering::Relaxed)) == phase.word()
     }
 
@@ -375,7 +375,7 @@ fn ctrl_c_ramps_down_and_waits() {
     assert!(board.is(Phase::Disarmed));
 }
 
-fn wait(board: &SocketBoard, phase: Phase) {
+pub fn wait(board: &SocketBoard, phase: Phase) {
     let start = Instant::now();
     while !board.is(phase) {
         assert!(start.elapsed() < Duration::from_secs(60), "{:?}", board.phase);

@@ -25,6 +25,7 @@ use specgen_runtime::wave::{AxisWave, Settings, Shape, Tone, step_of};
 
 mod card;
 mod clients;
+mod commission;
 mod edge;
 mod gcs;
 mod host;

@@ -22,7 +22,7 @@ pub(crate) use integrity::digest;
 pub use kinematics::{inverse_jacobian, joint_positions, leg_jacobian};
 pub use load::describe as describe_load;
 pub(crate) use sensing::seen;
-pub use sensing::{PoseNoise, pose_noise, poses_per_reading, reading_noise};
+pub use sensing::{PoseNoise, pose_noise, poses_per_reading, reading_noise, readings_per_pose};
 pub use supervision::{describe_wiring, single_faults};
 
 use crate::ir::{

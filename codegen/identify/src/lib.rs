@@ -20,8 +20,10 @@
 //! | [`response`], [`gauge`], [`stiffness`] | another record to an [`Estimate`] of values of the spec |
 //! | [`linear`], [`gains`], [`refit`] | records at several frequencies, and runs of a machine, to values of the spec |
 //! | [`declared`] | the records that a spec names, compared with the spec |
+//! | [`assembled`] | drives that identify the legs of an assembled platform with its own converters |
 //! | [`waveform`] | tables of poses from CSV, every bad row reported |
 
+pub mod assembled;
 mod branches;
 mod cause;
 mod columns;

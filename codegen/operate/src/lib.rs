@@ -7,10 +7,11 @@
 //! [`commands`] executes the commands of `specgen operate`, [`panel`] those of a page in the browser. [`pil`] runs the host library
 //! and a device in lock-step. [`gcs`] serves the General Command Set: `input` (bytes to commands), `commands`, `stage` (servo,
 //! target, limits), `server` (clients, one of which is in control). [`plant_server`] is the simulated machine with converters, and
-//! [`doctor`] checks a PC for real-time operation.
+//! [`doctor`] checks a PC for real-time operation. [`commission`] identifies a machine and its legs in place.
 
 mod command;
 pub mod commands;
+pub mod commission;
 pub mod doctor;
 pub mod frame;
 pub mod gcs;

@@ -80,6 +80,10 @@ enum Kind {
         amplitude: f64,
         levels: i32,
         seconds: f64,
+        #[serde(default)]
+        hold: f64,
+        #[serde(default)]
+        corner: f64,
     },
 }
 
@@ -144,7 +148,7 @@ fn words<T: Real>(file: &File, period: f64) -> Result<WaveWords, String> {
         Err(refused) => Err(match refused {
             Refusal::Word(word) => format!(
                 "{} is invalid: amplitudes must not be negative (except of ramp and reversals), chirps must stay between 0 Hz and \
-                 half the control rate",
+                 half the control rate, and a corner must not be longer than its hold and its step",
                 place_of(word)
             ),
             other => format!("{other:?}"),
@@ -260,12 +264,15 @@ impl Reading {
                 }
                 Shape::Multisine { first, count: wanted.len() }
             }
-            Kind::Reversals { amplitude, levels, seconds } => {
+            Kind::Reversals { amplitude, levels, seconds, hold, corner } => {
+                let or_none = |what, time: f64| if time == 0.0 { Ok(0) } else { self.ticks(what, time) };
                 let levels = Some(*levels).filter(|levels| *levels > 0);
                 Shape::Reversals {
                     amplitude: self.number("amplitude", *amplitude)?,
                     levels: levels.ok_or_else(|| "levels: expected 1 or more".to_owned())?,
                     ticks: self.ticks("seconds", *seconds)?,
+                    hold: or_none("hold", *hold)?,
+                    corner: or_none("corner", *corner)?,
                 }
             }
         })

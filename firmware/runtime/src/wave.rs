@@ -196,7 +196,7 @@ impl<T: Real> Wave<T> {
             self.tick = 0;
             self.stop = false;
             for (cursor, axis) in self.cursors.iter_mut().zip(&self.settings.axes) {
-                *cursor = Cursor::start(axis);
+                *cursor = Cursor::start(axis, self.settings.ramp_ticks);
             }
         }
     }

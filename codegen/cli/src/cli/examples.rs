@@ -163,6 +163,22 @@ Examples:
 
 Without displacement_um, the output is relative to negative saturation.";
 
+pub const COMMISSION: &str = "\
+Examples:
+  specgen commission platform.toml --plan
+      what the machine would do, and for how long
+  specgen commission platform.toml --socket rt.sock  # (board)
+      records in the folder `commission`, and platform.toml with their results
+  specgen commission commission/platform.toml --socket rt.sock  # (board)
+      once the machine runs that controller: acceptance
+  specgen commission platform.toml --socket rt.sock --again  # (board)
+      all of it again; with --step curves, the curves and what depends on them
+  specgen commission platform.toml --step spec --write  # (board)
+      the results into platform.toml itself
+
+The legs move one at a time over their whole stroke. However it ends, the
+machine is ramped down. It asks once; without a terminal it needs --yes.";
+
 pub const OPERATE: &str = "\
 Examples:
   specgen operate --port /dev/ttyACM0 platform.toml status  # (board)

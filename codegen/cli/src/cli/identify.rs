@@ -284,7 +284,7 @@ fn grid(text: &str) -> Result<usize, String> {
 }
 
 /// A family of leg models.
-fn model(text: &str) -> Result<LegModelKind, String> {
+pub(super) fn model(text: &str) -> Result<LegModelKind, String> {
     LegModelKind::of_word(text).ok_or_else(|| format!("expected {}, found `{text}`", LegModelKind::words()))
 }
 

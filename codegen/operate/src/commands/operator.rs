@@ -366,7 +366,7 @@ impl<P: Port> Operator<P> {
 
     /// Sends a move, and waits until the machine has accepted or refused it. It must be at rest: during a motion a machine does
     /// not look at the next command.
-    pub(super) fn go(&mut self, pose: [f64; 6]) -> Result<(), SessionError> {
+    pub(crate) fn go(&mut self, pose: [f64; 6]) -> Result<(), SessionError> {
         let words = self.words_of_move(&pose)?;
         self.send_and_see(words)?;
         let status = self.session.status();

@@ -126,7 +126,7 @@ impl<P: Port> Operator<P> {
         self.session.motion().ok_or_else(|| "the device controls six legs and has no pose".to_owned())
     }
 
-    pub(super) fn place(&mut self) -> Result<MeasuredPose, SessionError> {
+    pub(crate) fn place(&mut self) -> Result<MeasuredPose, SessionError> {
         let place = self.session.place()?;
         place.ok_or_else(|| SessionError::Refused("the device controls six legs and has no pose".to_owned()))
     }

@@ -38,6 +38,16 @@ struct WatchReport {
     kept: Vec<Sample>,
 }
 
+impl WatchReport {
+    fn new(every: u32, path: Option<&Path>) -> Self {
+        let file = path.map(|path| path.display().to_string());
+        Self { every, rows: 0, gaps: Vec::new(), file, kept: Vec::new() }
+    }
+}
+
+/// Begins the motion of a record.
+pub(crate) type Start<'a, P> = dyn FnMut(&mut Operator<P>) -> Result<(), SessionError> + 'a;
+
 /// Ticks without samples.
 #[derive(Serialize)]
 struct Gap {
@@ -213,11 +223,10 @@ impl<P: Port> Operator<P> {
             )),
             other => other.into(),
         })?;
-        let file = path.map(|path| path.display().to_string());
-        let mut watched = WatchReport { every, rows: 0, gaps: Vec::new(), file, kept: Vec::new() };
+        let mut watched = WatchReport::new(every, path);
         sink.begin(ui);
         let ticks = (seconds / period).ceil() as u64;
-        let ended = self.take(ticks, &mut watched, &mut sink, ui);
+        let ended = self.take(ticks, None, &mut watched, &mut sink, ui);
         // Keep the samples so far, even after an error.
         sink.finish()?;
         ended?;
@@ -226,7 +235,47 @@ impl<P: Port> Operator<P> {
         Ok(())
     }
 
-    fn take(&mut self, ticks: u64, watched: &mut WatchReport, sink: &mut Sink, ui: &Ui) -> Result<(), SessionError> {
+    /// Writes rows of `every` ticks, or of the fewest that the line carries, to a CSV file for a lead and a duration, s; `start` is
+    /// called after the lead. A file without a gap, or none.
+    pub(crate) fn record_rows(
+        &mut self,
+        every: u32,
+        [lead, seconds]: [f64; 2],
+        path: &Path,
+        start: &mut Start<'_, P>,
+        ui: &Ui,
+    ) -> Result<(), SessionError> {
+        let mut sink = Sink::new(Some(path), ui)?;
+        let every = match self.session.stream(every) {
+            Ok(()) => every,
+            Err(ClientError::Refused(Refusal::Rate { least })) => {
+                self.session.stream(least)?;
+                least
+            }
+            Err(other) => return Err(other.into()),
+        };
+        let mut watched = WatchReport::new(every, Some(path));
+        let [lead, ticks] = [lead, lead + seconds].map(|time| (time / self.session.period()).ceil() as u64);
+        self.take(ticks, Some((lead, start)), &mut watched, &mut sink, ui)?;
+        self.session.stream(0)?;
+        if !watched.gaps.is_empty() {
+            let text = watched.text();
+            return Err(SessionError::Fault(format!("{}: record it again, on a less busy computer", text.trim_end())));
+        }
+        sink.finish()?;
+        ui.progress(watched.text().trim_end());
+        Ok(())
+    }
+
+    /// `start`: called after so many ticks.
+    fn take(
+        &mut self,
+        ticks: u64,
+        mut start: Option<(u64, &mut Start<'_, P>)>,
+        watched: &mut WatchReport,
+        sink: &mut Sink,
+        ui: &Ui,
+    ) -> Result<(), SessionError> {
         let (mut next, mut number, mut end) = (None, 0_u32, None);
         let mut heard = Instant::now();
         loop {
@@ -248,6 +297,10 @@ impl<P: Port> Operator<P> {
                 }
             }
             sink.flush()?;
+            let lead = next.zip(end).map_or(0, |(next, end)| next.saturating_sub(end.saturating_sub(ticks)));
+            if let Some((_, start)) = start.take_if(|(after, _)| end.is_some() && lead >= *after) {
+                start(self)?;
+            }
             if next.zip(end).is_some_and(|(next, end)| next >= end) {
                 return Ok(());
             }

@@ -48,8 +48,9 @@ pub enum Shape<T> {
         /// Number of tones, `first` + `count` ≤ [`TONES`].
         count: usize,
     },
-    /// First-order reversal curves, as `specgen identify` reads them: for k = 1 … `levels`, straight from zero to
-    /// `amplitude` k/`levels` and back, all at one speed; then zero.
+    /// First-order reversal curves, as `specgen identify` reads them: for k = 1 … `levels`, a hold at zero, straight to
+    /// `amplitude` k/`levels`, a hold, and straight back, all at one speed; then zero. They begin with the end of the
+    /// wave's smooth start.
     Reversals {
         /// Highest peak; of either sign.
         amplitude: T,
@@ -57,6 +58,10 @@ pub enum Shape<T> {
         levels: i32,
         /// Ticks for `amplitude`/`levels`, ≥ 1.
         ticks: i32,
+        /// Ticks of a hold, ≥ 0.
+        hold: i32,
+        /// Ticks over which the speed changes, half of them within the hold; at most `hold` and `ticks`.
+        corner: i32,
     },
 }
 
@@ -122,6 +127,22 @@ fn angular<T: Real>(step: u64) -> T {
 
 impl<T: Real> Sample<T> {
     const ZERO: Self = Self { value: T::ZERO, rate: T::ZERO, bend: T::ZERO };
+
+    /// Spreads a `change` of the rate at a kink, `since` ticks ago, over `corner` ticks about it.
+    fn round(&mut self, since: i32, corner: i32, change: T) {
+        if since <= -corner || since >= corner {
+            return;
+        }
+        let away = if since < 0 { -since } else { since };
+        let left = corner - 2 * away;
+        if left > 0 {
+            let (left, bend) = (T::from_i32(left), change / T::from_i32(corner));
+            let rate = T::from_f64(0.5) * bend * left;
+            self.value = self.value + T::from_f64(0.25) * rate * left;
+            self.rate = self.rate + if since <= 0 { rate } else { -rate };
+            self.bend = self.bend + bend;
+        }
+    }
 }
 
 impl<T: Real> Tone<T> {
@@ -160,8 +181,10 @@ impl<T: Real> AxisWave<T> {
         match &self.shape {
             Shape::Constant => Peak { low: zero, high: zero, rate: zero, bend: zero },
             Shape::Ramp { amplitude, ticks } => straight(*amplitude, amplitude.abs() / T::from_i32(*ticks)),
-            Shape::Reversals { amplitude, levels, ticks } => {
-                straight(*amplitude, amplitude.abs() / T::from_i32(*levels) / T::from_i32(*ticks))
+            Shape::Reversals { amplitude, levels, ticks, corner, .. } => {
+                let rate = amplitude.abs() / T::from_i32(*levels) / T::from_i32(*ticks);
+                let bend = if *corner > 0 { rate / T::from_i32(*corner) } else { zero };
+                Peak { bend, ..straight(*amplitude, rate) }
             }
             Shape::Triangle { amplitude, step } => {
                 let turns = angular::<T>(*step) * T::from_f64(1.0 / core::f64::consts::TAU);
@@ -203,8 +226,9 @@ impl Cursor {
         Self { tick: 0, peak: 1, phase: 0, step: 0 }
     }
 
-    pub(super) fn start<T: Real>(axis: &AxisWave<T>) -> Self {
+    pub(super) fn start<T: Real>(axis: &AxisWave<T>, ramp_ticks: i32) -> Self {
         match &axis.shape {
+            Shape::Reversals { .. } => Self { tick: 1 - ramp_ticks, ..Self::new() },
             Shape::Sine { tone } | Shape::Chirp { tone, .. } => {
                 Self { phase: tone.phase, step: tone.step, ..Self::new() }
             }
@@ -257,25 +281,41 @@ impl Cursor {
                 }
                 sum
             }
-            Shape::Reversals { amplitude, levels, ticks } => self.reversal(*amplitude, *levels, *ticks),
+            Shape::Reversals { amplitude, levels, ticks, hold, corner } => {
+                self.reversal(*amplitude, *levels, *ticks, *hold, *corner)
+            }
         }
     }
 
-    fn reversal<T: Real>(&mut self, amplitude: T, levels: i32, ticks: i32) -> Sample<T> {
-        if self.peak > levels {
+    fn reversal<T: Real>(&mut self, amplitude: T, levels: i32, ticks: i32, hold: i32, corner: i32) -> Sample<T> {
+        let tick = self.tick.saturating_add(1);
+        self.tick = tick;
+        if tick <= 0 || self.peak > levels {
             return Sample::ZERO;
         }
-        self.tick += 1;
         let top = self.peak.saturating_mul(ticks);
-        let left = top.saturating_sub(self.tick.saturating_sub(top));
-        let rises = self.tick <= top;
-        let height = if rises { self.tick } else { left };
-        if left <= 0 {
-            self.peak += 1;
-            self.tick = 0;
-        }
+        let (high, fall) = (hold + top, hold + top + hold);
+        let end = fall + top;
         let slope = amplitude / (T::from_i32(levels) * T::from_i32(ticks));
-        Sample { value: slope * T::from_i32(height), rate: if rises { slope } else { -slope }, bend: T::ZERO }
+        let (height, rate) = if tick <= hold || tick > end {
+            (0, T::ZERO)
+        } else if tick <= high {
+            (tick - hold, slope)
+        } else if tick <= fall {
+            (top, T::ZERO)
+        } else {
+            (end - tick, -slope)
+        };
+        let mut sample = Sample { value: slope * T::from_i32(height), rate, bend: T::ZERO };
+        for (kink, change) in [(hold, slope), (high, -slope), (fall, -slope), (end, slope)] {
+            sample.round(tick - kink, corner, change);
+        }
+        // The last corner ends within the next hold.
+        if tick >= end + corner / 2 {
+            self.peak += 1;
+            self.tick = tick - end;
+        }
+        sample
     }
 }
 

@@ -6,7 +6,7 @@ use crate::real::Real;
 use crate::snapshot::{InvalidState, Reader, Writer};
 
 /// Words of an axis: kind (index in [`Shape`]), offset, amplitude, and four more: steps before phases, levels before
-/// ticks.
+/// ticks, hold before corner.
 const AXIS: usize = 7;
 /// Words of [`Settings`]: center, axes, tones, two counts.
 pub const WORDS: usize = 6 + 6 * AXIS + TONES * 3 + 2;
@@ -124,7 +124,9 @@ impl<T: Real> AxisWave<T> {
                 (4, tone.amplitude, [tone.step, tone.phase, sweep as u64, tick(ticks)])
             }
             Shape::Multisine { first, count } => (5, zero, [first as u64, count as u64, 0, 0]),
-            Shape::Reversals { amplitude, levels, ticks } => (6, amplitude, [tick(levels), tick(ticks), 0, 0]),
+            Shape::Reversals { amplitude, levels, ticks, hold, corner } => {
+                (6, amplitude, [tick(levels), tick(ticks), tick(hold), tick(corner)])
+            }
         };
         words.word(kind);
         words.real(self.offset);
@@ -157,7 +159,9 @@ impl<T: Real> AxisWave<T> {
                 if levels.saturating_mul(ticks) > MOST / 2 {
                     return Err(words.refused());
                 }
-                (Shape::Reversals { amplitude, levels, ticks }, 2)
+                let hold = words.count_to(MOST / 4)?;
+                let corner = words.count_to(if hold < ticks { hold } else { ticks })?;
+                (Shape::Reversals { amplitude, levels, ticks, hold, corner }, 4)
             }
         };
         // Unused words must be zero, so that each shape has one encoding.

@@ -144,7 +144,7 @@ fn limits_hold_and_are_not_wasted() {
 fn reversal_curves_are_those_that_identify_reads() {
     let mut settings = Settings::still();
     let (levels, ticks) = (4, 5);
-    settings.axes[2].shape = Shape::Reversals { amplitude: 4e-5, levels, ticks };
+    settings.axes[2].shape = Shape::Reversals { amplitude: 4e-5, levels, ticks, hold: 0, corner: 0 };
     settings.ticks = 150;
     let all = run(&settings, wide());
     // For k = 1..=N from 0 to k/N and back.
@@ -156,6 +156,52 @@ fn reversal_curves_are_those_that_identify_reads() {
         assert!((all[tick].pose[2] - expected).abs() < 1e-18, "tick {tick}: {} {expected}", all[tick].pose[2]);
     }
     assert!(all[path.len()..].iter().all(|motion| motion.pose[2] == 0.0));
+}
+
+/// With a hold at each turn and rounded corners: peaks and returns are exact, and nothing jumps.
+#[test]
+fn reversal_curves_hold_at_their_turns_and_round_their_corners() {
+    let mut settings = Settings::still();
+    let (levels, ticks, hold) = (3, 40, 30);
+    for corner in [20, 21, 30] {
+        settings.axes[2].shape = Shape::Reversals { amplitude: 3e-5, levels, ticks, hold, corner };
+        settings.ramp_ticks = 100;
+        let length = levels * (levels + 1) * ticks + 2 * levels * hold;
+        settings.ticks = length + 3 * 100;
+        let all = run(&settings, wide());
+        let at = |tick: i32| &all[(99 + tick - 1) as usize];
+        // They begin with the end of the smooth start.
+        assert!((-50..=hold - corner / 2 - 1).all(|tick| at(tick).pose[2] == 0.0));
+        let mut begin = 0;
+        for curve in 1..=levels {
+            let peak = 1e-5 * f64::from(curve);
+            let high = begin + hold + curve * ticks;
+            for tick in high + corner / 2 + 1..high + hold - corner / 2 {
+                assert!((at(tick).pose[2] - peak).abs() < 1e-18, "curve {curve}, tick {tick}");
+            }
+            // A quarter of half a corner is lost at the kink itself.
+            let lost = peak - at(high).pose[2];
+            let expected = 1e-5 / f64::from(ticks) * f64::from(corner) / 8.0;
+            assert!((lost - expected).abs() < 1e-15, "{lost:e} {expected:e}");
+            begin = high + hold + curve * ticks;
+            assert!(at(begin + hold / 2).pose[2].abs() < 1e-18);
+        }
+        assert_eq!(begin, length);
+        let mut bends = [0.0, 0.0];
+        for tick in -90..length + 90 {
+            let [before, now, after] = [at(tick - 1), at(tick), at(tick + 1)];
+            let rate = (after.pose[2] - before.pose[2]) / (2.0 * PERIOD);
+            let bend = (after.rate[2] - before.rate[2]) / (2.0 * PERIOD);
+            let most = 1e-5 / f64::from(ticks * corner) / (PERIOD * PERIOD);
+            // At the ends of a corner a central difference has the curvature of one side for a tick.
+            assert!((rate - now.rate[2]).abs() <= 0.51 * most * PERIOD, "corner {corner}, tick {tick}");
+            assert!(bend.abs() < most * 1.001 && now.acceleration[2].abs() < most * 1.001, "tick {tick}");
+            bends = [worse(bends[0], bend), worse(bends[1], -bend)];
+            let speed = 1e-5 / f64::from(ticks) / PERIOD;
+            assert!(now.rate[2].abs() <= speed * (1.0 + 1e-9));
+        }
+        assert!(bends.iter().all(|bend| *bend > 0.0));
+    }
 }
 
 #[test]
@@ -193,7 +239,7 @@ fn words_read_back_and_any_words_are_refused_or_keep_their_limits() {
     let words = settings.to_words();
     assert_eq!(Settings::<f64>::from_words(&words), Ok(settings));
     let mut reversals = Settings::<f32>::still();
-    reversals.axes[1].shape = Shape::Reversals { amplitude: -1e-5, levels: 32, ticks: 100 };
+    reversals.axes[1].shape = Shape::Reversals { amplitude: -1e-5, levels: 32, ticks: 100, hold: 60, corner: 50 };
     assert_eq!(Settings::from_words(&reversals.to_words()), Ok(reversals));
     // One word is the wrong number of tones.
     let mut bad = words;
@@ -296,8 +342,9 @@ fn every_word_of_a_shape_has_its_bounds() {
     }
     assert_eq!(with(5, 0.0, [4, 12, 0, 0]), Ok(Shape::Multisine { first: 4, count: 12 }));
     assert_eq!(with(5, 0.0, [TONES as u64, 0, 0, 0]), Ok(Shape::Multisine { first: TONES, count: 0 }));
-    let reversals = Shape::Reversals { amplitude: -2e-6, levels: 1 << 10, ticks: 1 << 19 };
-    assert_eq!(with(6, -2e-6, [1 << 10, 1 << 19, 0, 0]), Ok(reversals));
+    let (amplitude, hold) = (-2e-6, 1 << 28);
+    let reversals = Shape::Reversals { amplitude, levels: 1 << 10, ticks: 1 << 19, hold, corner: 1 << 19 };
+    assert_eq!(with(6, -2e-6, [1 << 10, 1 << 19, 1 << 28, 1 << 19]), Ok(reversals));
     for (kind, amplitude, rest, word) in [
         (7, 0.0, [0; 4], 0),
         (2, -1e-9, [1, 0, 0, 0], 2),
@@ -320,7 +367,9 @@ fn every_word_of_a_shape_has_its_bounds() {
         (6, 0.0, [0, 1, 0, 0], 3),
         (6, 0.0, [1, 0, 0, 0], 4),
         (6, 0.0, [1 << 10, (1 << 19) + 1, 0, 0], 4),
-        (6, 0.0, [1, 1, 1, 0], 5),
+        (6, 0.0, [1, 1, (1 << 28) + 1, 0], 5),
+        (6, 0.0, [1, 4, 3, 4], 6),
+        (6, 0.0, [1, 3, 4, 4], 6),
     ] {
         assert_eq!(with(kind, amplitude, rest), refused(word), "kind {kind}: {rest:?}");
     }

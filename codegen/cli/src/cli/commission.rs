@@ -1,0 +1,71 @@
+//! `specgen commission`: identifies a wired machine with its own converters, step by step, writes its spec, and verifies it.
+
+use clap::Args;
+use specgen_compiler::spec_file;
+use specgen_language::model::LegModelKind;
+use specgen_language::outcome::Failure;
+use specgen_language::ui::Ui;
+use specgen_operate::commission::{self, Options, Step};
+
+use super::identify::model;
+use super::line::Line;
+use super::number::number;
+use super::path_roles::{InputFile, OutputFolder};
+
+/// Arguments of `commission`.
+#[derive(Args, Debug)]
+#[command(after_help = super::examples::COMMISSION)]
+pub struct Arguments {
+    /// The spec that the device was built from: first a draft, after the steps up to `spec` the one that they wrote.
+    spec: InputFile,
+    #[command(flatten)]
+    line: Line,
+    /// Folder of records and results. A commissioning that was interrupted continues from it.
+    #[arg(short, long, value_name = "DIR", default_value = "commission")]
+    output: OutputFolder,
+    /// Do only this step: wiring, cross-talk, curves, identify, spec or acceptance. May be repeated.
+    #[arg(long, value_name = "STEP", value_parser = Step::parse)]
+    step: Vec<Step>,
+    /// Do the steps again, all or those of --step, and those that depend on them: their records are replaced.
+    #[arg(long)]
+    again: bool,
+    /// Skip a step, such as curves="identified before"; the page names the reason.
+    #[arg(long, value_name = "STEP=REASON", value_parser = Step::parse_skip)]
+    skip: Vec<(Step, String)>,
+    /// Reversal curves of a leg; 32 if not given.
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u16).range(4..=128))]
+    grid: Option<u16>,
+    /// Frequency of the mains, Hz; 50 if not given.
+    #[arg(long, value_name = "HZ", value_parser = number("Hz", "a frequency from 10 to 100 Hz", 10.0..=100.0), allow_negative_numbers = true)]
+    mains: Option<f64>,
+    /// Leg model: preisach, bouc-wen, generalized-plays, plays, bouc-wen-plays; or auto: one of these for each leg, by the
+    /// error on its arbitrary record.
+    #[arg(long, value_name = "MODEL", value_parser = model, default_value = "auto")]
+    model: LegModelKind,
+    /// Name or serial number of the machine, for the page.
+    #[arg(long, value_name = "NAME")]
+    machine: Option<String>,
+    /// Print what the machine would do and for how long, and send nothing.
+    #[arg(long, conflicts_with = "yes")]
+    plan: bool,
+    /// Begin without a question.
+    #[arg(long)]
+    yes: bool,
+    /// Only compute figures and page again from the records.
+    #[arg(long, conflicts_with_all = ["plan", "yes", "step", "again", "skip"])]
+    report: bool,
+    /// Edit the spec in place, instead of writing platform.toml into the folder of the records.
+    #[arg(long)]
+    write: bool,
+}
+
+pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
+    let options = options!(arguments => Options {
+        again skip mains model machine plan yes report write;
+        spec: arguments.spec.to_path_buf(), output: arguments.output.to_path_buf(), steps: arguments.step.clone(),
+        grid: arguments.grid.map(usize::from),
+    });
+    let line = arguments.line.is_named().then(|| arguments.line.end()).transpose()?;
+    let compiled = spec_file::looked_up(&arguments.spec, ui)?;
+    commission::run(line, &options, &compiled, ui)
+}

@@ -1,0 +1,202 @@
+//! The spec with what was found: an edit that keeps comments and layout, and says which record each value is from.
+
+use std::path::{Component, Path};
+
+use specgen_compiler::compile::{self, Compilation};
+use specgen_language::outcome::Failure;
+use specgen_language::spec::SpecSource;
+use toml_edit::{Array, DocumentMut, Item, Table, Value};
+
+use super::state::{State, Step};
+
+/// Keys of creep and rate that a leg model replaces.
+const RATE: [&str; 4] = ["rate", "creep_times", "creep_weights", "rate_tables"];
+
+/// The text of a spec with the findings of `state`, and its compilation. `folder`: of the records, from `dir`, that of the new spec;
+/// empty if it is the same.
+///
+/// # Errors
+/// The compiler refuses the text.
+pub(super) fn edited(
+    compiled: &Compilation,
+    state: &State,
+    folder: &str,
+    dir: &Path,
+) -> Result<(String, Compilation), Failure> {
+    let sizes = (compiled.model.actuator.stacks, compiled.model.hysteresis.grid);
+    let text = with(&compiled.source.text, state, folder, sizes).map_err(Failure::Gate)?;
+    let source =
+        SpecSource { text: text.clone(), dir: dir.to_owned(), display_name: "the commissioned spec".to_owned() };
+    Ok((text, compile::compile_source(source)?))
+}
+
+/// The text of a spec with what was found; `grid`: cells of the tables.
+fn with(text: &str, state: &State, folder: &str, (stacks, grid): (u32, usize)) -> Result<String, String> {
+    let mut document: DocumentMut = text.parse().map_err(|error| format!("{error}"))?;
+    let mut measured = Vec::new();
+    let date = |step| state.steps.get(&step).map_or("", |passed| passed.date.as_str());
+    if !state.legs.is_empty() {
+        let hysteresis = section(&mut document, "hysteresis")?;
+        let files: Array = (0..state.legs.len()).map(|leg| format!("{folder}leg{leg}.csv")).collect();
+        RATE.iter().for_each(|key| drop(hysteresis.remove(key)));
+        hysteresis.entry("grid").or_insert(toml_edit::value(grid as i64));
+        let models: Vec<&str> = state.legs.iter().map(|leg| leg.model.as_str()).collect();
+        let (first, models) = (&state.legs[0].record, listed(&models));
+        let note = format!("measured in place {}, {first} and others; {models}", date(Step::Curves));
+        set(hysteresis, "records", Value::Array(files), &note);
+        let actuator = section(&mut document, "actuator")?;
+        let gain = state.legs.iter().fold(0.0, |sum, leg| sum + leg.gain) / state.legs.len() as f64;
+        let value = format!("{:.5} um/V", gain / f64::from(stacks) * 1e6);
+        set(actuator, "stack_gain", value.into(), &format!("mean of the legs, measured {}", date(Step::Curves)));
+        measured.extend(["hysteresis.records", "actuator.stack_gain"]);
+    }
+    if let Some(coupling) = &state.cross_talk {
+        let actuator = section(&mut document, "actuator")?;
+        let rows = coupling.matrix.iter().map(|row| row.iter().map(|entry| rounded(*entry)).collect::<Array>());
+        let mut matrix: Array = rows.collect();
+        for row in matrix.iter_mut() {
+            row.decor_mut().set_prefix("\n    ");
+        }
+        matrix.set_trailing("\n");
+        matrix.set_trailing_comma(true);
+        let note = format!("leg0-cross-talk.csv to leg5-cross-talk.csv, measured {}", date(Step::CrossTalk));
+        set(actuator, "cross_talk", Value::Array(matrix), &note);
+        measured.push("actuator.cross_talk");
+    }
+    if let Some(assumed) = document.get_mut("assumed").and_then(Item::as_array_mut) {
+        assumed.retain(|entry| entry.as_str().is_none_or(|key| !measured.contains(&key)));
+    }
+    let written = document.to_string();
+    // The editor ends every line with `\n`.
+    Ok(if text.contains("\r\n") { written.replace("\r\n", "\n").replace('\n', "\r\n") } else { written })
+}
+
+/// Each word once, in order.
+fn listed(words: &[&str]) -> String {
+    let mut once: Vec<&str> = Vec::new();
+    for word in words {
+        if !once.contains(word) {
+            once.push(word);
+        }
+    }
+    once.join(" / ")
+}
+
+/// To seven digits behind the point: 0.1 nm of a stroke of a millimetre.
+fn rounded(entry: f64) -> f64 {
+    libm::round(entry * 1e7) / 1e7
+}
+
+fn section<'a>(document: &'a mut DocumentMut, name: &str) -> Result<&'a mut Table, String> {
+    let table = document.get_mut(name).and_then(Item::as_table_mut);
+    table.ok_or_else(|| format!("`{name}` is not written as a section [{name}]: write it so, and repeat the step"))
+}
+
+/// Replaces a value and the comment behind it, or adds it.
+fn set(table: &mut Table, key: &str, mut value: Value, note: &str) {
+    value.decor_mut().set_prefix(" ");
+    value.decor_mut().set_suffix(format!("  # {note}"));
+    match table.get_mut(key) {
+        Some(old) => *old = Item::Value(value),
+        None => drop(table.insert(key, Item::Value(value))),
+    }
+}
+
+/// Whether a spec names files beside its records: a copy in another folder would not find them.
+pub(super) fn names_files(text: &str) -> bool {
+    let Ok(document) = text.parse::<DocumentMut>() else { return false };
+    let trajectories = document.get("trajectory").and_then(Item::as_array_of_tables);
+    let joints = document.get("geometry").and_then(|geometry| geometry.get("joints"));
+    joints.is_some() || trajectories.is_some_and(|all| all.iter().any(|one| one.contains_key("file")))
+}
+
+/// The folder of the records from that of the spec, such as `commission/`.
+///
+/// # Errors
+/// It is not within the folder of the spec.
+pub(super) fn from_spec(spec: &Path, folder: &Path) -> Result<String, Failure> {
+    let dir = spec.parent().filter(|dir| !dir.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let whole = |path: &Path| path.canonicalize().unwrap_or_default();
+    let relative = whole(folder).strip_prefix(whole(dir)).map(Path::to_owned).ok();
+    let plain = |path: &Path| path.components().all(|part| matches!(part, Component::Normal(_)));
+    let text = relative.filter(|path| plain(path)).and_then(|path| path.to_str().map(str::to_owned));
+    match text.filter(|text| !text.contains('\\')) {
+        Some(text) if text.is_empty() => Ok(text),
+        Some(text) => Ok(text + "/"),
+        None => Err(Failure::Usage(format!(
+            "--write needs the records within the folder of the spec: give -o a folder in `{}`",
+            dir.display()
+        ))),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::state::{Coupling, Leg};
+    use super::*;
+
+    fn state() -> State {
+        let leg = |gain: f64| Leg {
+            model: "plays".to_owned(),
+            gain,
+            fit_rms: 1e-9,
+            arbitrary_rms: None,
+            record: "leg0-curves-156.csv".to_owned(),
+        };
+        let mut state = State { legs: vec![leg(6.0e-7), leg(6.2e-7)], ..State::default() };
+        let mut matrix = [[0.0; 6]; 6];
+        matrix[0][1] = 0.012_345_678_9;
+        state.cross_talk = Some(Coupling { matrix, error: 1e-5 });
+        state.pass(Step::Curves, None);
+        state.pass(Step::CrossTalk, None);
+        state
+    }
+
+    #[test]
+    fn what_was_found_is_written_with_its_record_and_nothing_else_changes() {
+        let text = "# head\nassumed = [\"actuator.stack_gain\", \"sensor.noise\"]\n\n[actuator]   # legs\nstacks = 5\n\
+            stack_gain = \"0.1 um/V\"   # guess\n\n[hysteresis]\ngrid = 32 # N\nrecords = [\"a.csv\"]\nrate = \"creep\"\n\
+            creep_times = [\"1 s\"]\ncreep_weights = [0.1]\n\n[timing]\nperiod = \"100 us\"\n";
+        for text in [text.to_owned(), text.replace('\n', "\r\n")] {
+            let new = with(&text, &state(), "commission/", (5, 32)).unwrap();
+            let lines: Vec<&str> = new.lines().collect();
+            assert_eq!(new.contains("\r\n"), text.contains("\r\n"));
+            let line = |start: &str| *lines.iter().find(|line| line.starts_with(start)).unwrap_or(&"");
+            let records = line("records");
+            assert!(records.starts_with("records = [\"commission/leg0.csv\", \"commission/leg1.csv\"]"), "{new}");
+            assert!(records.contains("  # measured in place 20") && records.ends_with("others; plays"), "{new}");
+            assert!(
+                line("stack_gain").starts_with("stack_gain = \"0.12200 um/V\"  # mean of the legs, measured 20"),
+                "{new}"
+            );
+            assert!(
+                !line("    [0.0, 0.0123457,").is_empty() && line("assumed").ends_with("\"sensor.noise\"]"),
+                "{new}"
+            );
+            for kept in ["# head", "[actuator]   # legs", "grid = 32 # N", "[timing]", "period = \"100 us\""] {
+                assert!(lines.contains(&kept), "{kept}: {new}");
+            }
+            assert!(!new.contains("creep") && !new.contains("rate"), "{new}");
+            // Again, as after a repeated step.
+            assert_eq!(with(&new, &state(), "commission/", (5, 32)).unwrap(), new);
+        }
+        assert!(
+            with("actuator = 1\n", &state(), "", (5, 32))
+                .unwrap_err()
+                .contains("not written as a section [hysteresis]")
+        );
+    }
+
+    #[test]
+    fn records_are_named_from_the_folder_of_the_spec() {
+        let folder = tempfile::tempdir().unwrap();
+        let spec = folder.path().join("platform.toml");
+        let records = folder.path().join("runs/one");
+        std::fs::create_dir_all(&records).unwrap();
+        assert_eq!(from_spec(&spec, &records).unwrap(), "runs/one/");
+        assert_eq!(from_spec(&records.join("platform.toml"), &records).unwrap(), "");
+        assert!(
+            from_spec(&records.join("platform.toml"), folder.path()).unwrap_err().message().contains("--write needs")
+        );
+    }
+}
