@@ -57,7 +57,6 @@ pub struct Preparation {
 
 impl Preparation {
     /// From the parameters of a leg, to a drive of `rest` (V).
-    #[must_use]
     pub fn of(leg: &LegParameters, rest: f64) -> Self {
         Self { peak: leg.u_max, rate: leg.forc_rate_v_per_s, settle: leg.settle_s, update: leg.step_s, rest }
     }
@@ -76,7 +75,6 @@ pub struct Tracking {
 
 impl Tracking {
     /// The part of the path that the samples cover.
-    #[must_use]
     pub fn coverage(&self) -> Coverage {
         Coverage::new(self.samples.len(), self.path, self.interval)
     }
@@ -106,7 +104,6 @@ pub struct TickWords<'a> {
 
 impl TickWords<'_> {
     /// Digest of the controller's state after the tick.
-    #[must_use]
     pub fn digest(&self) -> u64 {
         self.controller.state_digest()
     }
@@ -192,7 +189,6 @@ impl From<DescriptionError> for RunError {
 
 impl Run {
     /// CSV: the words of the trace, then time, set-point of each leg, set-point less reading, and the status as text.
-    #[must_use]
     pub fn to_csv(&self) -> String {
         let status = self.trace.description().output("status").ok();
         let inputs = self.trace.description().input_names.len();
@@ -218,7 +214,6 @@ impl Run {
 
 impl Rig {
     /// Legs as built, each with its own noise stream from one seed.
-    #[must_use]
     pub fn new(legs: [LegPlant; LEGS], noise: &NoiseParameters, seed: u64) -> Self {
         let mut index = 0;
         let channels = legs.map(|leg| {
@@ -355,7 +350,6 @@ impl Rig {
     }
 
     /// Positions of the legs, from the zeros of their gauges, m.
-    #[must_use]
     pub fn displacements(&self) -> [f64; LEGS] {
         self.channels.each_ref().map(|channel| channel.gauge.from_zero(channel.leg.displacement()))
     }

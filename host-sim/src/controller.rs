@@ -142,7 +142,6 @@ pub struct Controller {
 
 impl Controller {
     /// Sizes and alignments of its state, its configuration, and its machine.
-    #[must_use]
     pub fn layouts(&self) -> [Layout; 3] {
         self.engine.layouts()
     }
@@ -170,14 +169,12 @@ impl Controller {
     }
 
     /// The controller's self-description: `key=value` lines, as at the start of its record files.
-    #[must_use]
     pub fn text(&self) -> &str {
         &self.text
     }
 
     /// Another controller with the same constants, configuration and state: for several continuations from here, also
     /// in other threads.
-    #[must_use]
     pub fn fork(&self) -> Self {
         Self { text: self.text.clone(), description: self.description.clone(), engine: self.engine.fork() }
     }

@@ -16,19 +16,16 @@ pub struct Coverage {
 
 impl Coverage {
     /// For a number of ticks of an interval (s), of a path of `path` ticks.
-    #[must_use]
     pub fn new(ticks: usize, path: usize, interval: f64) -> Self {
         Self { seconds: ticks as f64 * interval, path_seconds: path as f64 * interval }
     }
 
     /// `1.000/1.000 s`, a short form: duration, and length of the path.
-    #[must_use]
     pub fn brief(&self) -> String {
         format!("{:.3}/{:.3} s", self.seconds, self.path_seconds)
     }
 
     /// Whether the path was measured completely, at least once.
-    #[must_use]
     pub fn is_whole(&self) -> bool {
         self.seconds >= self.path_seconds
     }

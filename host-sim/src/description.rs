@@ -59,7 +59,6 @@ pub enum DescriptionError {
 
 impl Description {
     /// Output lines of triggers.
-    #[must_use]
     pub fn lines(&self) -> usize {
         self.config_names.iter().filter(|name| name.starts_with("trigger_kind[")).count()
     }
@@ -93,7 +92,6 @@ impl Description {
     }
 
     /// The lines that [`Description::parse`] reads.
-    #[must_use]
     pub fn to_text(&self) -> String {
         let (name, digest, version, bits) = (&self.name, &self.digest, &self.version, self.scalar.bits());
         let (config, inputs) = (self.config_names.join(","), self.input_names.join(","));
@@ -176,7 +174,6 @@ pub(crate) fn fields(text: &str) -> BTreeMap<&str, &str> {
 }
 
 /// Names of words that come in sixes, `stem[0]` to `stem[5]` of each stem.
-#[must_use]
 pub fn indexed(stems: &[&str]) -> Vec<String> {
     stems.iter().flat_map(|stem| (0..6).map(move |k| format!("{stem}[{k}]"))).collect()
 }

@@ -32,13 +32,11 @@ pub struct ReversalExperiment {
 
 impl ReversalExperiment {
     /// N curves to 100 V at 20 V/s, 0.39 V and 19.5 ms between rows for N = 32.
-    #[must_use]
     pub fn reference(intervals: u32) -> Self {
         Self { intervals, drive_max: 100.0, rate: 20.0, rows_per_interval: 8, update: 5e-5 }
     }
 
     /// Length in s.
-    #[must_use]
     pub fn duration(&self) -> f64 {
         let n = f64::from(self.intervals);
         self.drive_max * (n + 1.0) / self.rate
@@ -54,7 +52,6 @@ impl ReversalExperiment {
 
     /// The drive of every row, V, above `lowest`. Before the curves it goes there from 0 V at the same slope, and rests
     /// for `rest` (s).
-    #[must_use]
     pub fn drive(&self, lowest: f64, rest: f64) -> Vec<f64> {
         let levels = self.intervals * self.rows_per_interval;
         let mut drive = self.lead_in(lowest, rest);
@@ -67,7 +64,6 @@ impl ReversalExperiment {
     }
 
     /// The drive before the curves: from 0 V to `lowest` (V) and `rest` (s) there, at least one row.
-    #[must_use]
     pub fn lead_in(&self, lowest: f64, rest: f64) -> Vec<f64> {
         let step = self.drive_max / f64::from(self.intervals * self.rows_per_interval);
         let approach = (lowest.abs() / step).ceil();
@@ -135,7 +131,6 @@ impl ReversalRecord {
     /// CSV with the columns `time_s,drive_V,displacement_um`, and a comment below their names that marks it as
     /// simulated. Resolutions are 1e-8 s, 1e-5 V and 1e-5 µm, a tenth of the smallest noise here; grid nodes of N = 32
     /// over 100 V are exact.
-    #[must_use]
     pub fn to_csv(&self) -> String {
         let mut out = format!("time_s,drive_V,displacement_um\n{SIMULATED}\n");
         for row in &self.rows {
@@ -148,7 +143,6 @@ impl ReversalRecord {
 }
 
 /// Decimal with at most `digits` after the point and no trailing zeros; −0 becomes 0.
-#[must_use]
 pub fn trimmed(value: f64, digits: usize) -> String {
     let text = format!("{value:.digits$}");
     let text = if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { &text };

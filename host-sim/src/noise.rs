@@ -23,7 +23,6 @@ pub struct Gaussian {
 
 impl Gaussian {
     /// `deviation` in any unit (≥ 0); `stream` distinguishes generators of one seed.
-    #[must_use]
     pub fn new(deviation: f64, seed: u64, stream: u64) -> Self {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         rng.set_stream(stream);
@@ -78,7 +77,6 @@ pub struct Gauge {
 
 impl Gauge {
     /// Gauge of leg `leg` (0 to 5); each leg has its own noise.
-    #[must_use]
     pub fn new(noise: &NoiseParameters, seed: u64, leg: u64) -> Self {
         Self {
             noise: Gaussian::new(noise.sensor_nm_rms * 1e-9, seed, 2 * leg),
@@ -98,7 +96,6 @@ impl Gauge {
     }
 
     /// `displacement` (m) from the zero, without noise and steps.
-    #[must_use]
     pub fn from_zero(&self, displacement: f64) -> f64 {
         displacement - self.zero
     }
@@ -121,7 +118,6 @@ fn nearest(x: f64) -> f64 {
 }
 
 /// Noise of one leg's amplifier, V, drawn once per held voltage.
-#[must_use]
 pub fn amplifier(noise: &NoiseParameters, seed: u64, leg: u64) -> Gaussian {
     Gaussian::new(noise.amplifier_mv_rms * 1e-3, seed, 2 * leg + 1)
 }

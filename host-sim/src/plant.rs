@@ -22,7 +22,6 @@ pub(crate) use shape::StepShape;
 
 /// Number of equal steps, none longer than `longest`, that make up `duration`; at least one. A ratio within 1e-9 of a
 /// whole number counts as that number, so that 0.02 s is 400 steps of 50 µs.
-#[must_use]
 pub(crate) fn steps_within(duration: f64, longest: f64) -> u32 {
     // `as` saturates, and a NaN becomes 0: both give a bounded count.
     (libm::ceil(duration / longest - 1e-9) as u32).max(1)

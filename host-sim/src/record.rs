@@ -165,13 +165,11 @@ impl<R: Read> Reader<R> {
     }
 
     /// Whose record it is.
-    #[must_use]
     pub fn header(&self) -> &Header {
         &self.header
     }
 
     /// Input words of a row: those of the control law, then those of the supervisor.
-    #[must_use]
     pub fn input_names(&self) -> Vec<String> {
         self.header.input_names()
     }
@@ -232,7 +230,6 @@ impl<R: Read> Reader<R> {
 
 impl Header {
     /// Names of a row's input words: those of the control law, then those of the supervisor.
-    #[must_use]
     pub fn input_names(&self) -> Vec<String> {
         let mut names = self.description.input_names.clone();
         names.extend(["request", "events"].map(str::to_owned));

@@ -30,14 +30,12 @@ impl LegScenario {
     ///
     /// `noise` replaces the noise in the parameters of all legs (`NoiseParameters::NONE` for none);
     /// `samples_per_period` is N_s (≥ 1): the control interval is 1/(N_s f).
-    #[must_use]
     pub fn new(legs: &[LegParameters; LEGS], noise: &NoiseParameters, seed: u64, samples_per_period: u32) -> Self {
         Self::resting(legs, noise, seed, samples_per_period, [0.0; 2])
     }
 
     /// As [`LegScenario::new`] with another lowest voltage than 0 V, at which the gauges are zeroed and from which the
     /// legs' drive counts, and a rest voltage above it for the legs before a run; V.
-    #[must_use]
     pub fn resting(
         legs: &[LegParameters; LEGS],
         noise: &NoiseParameters,
@@ -52,7 +50,6 @@ impl LegScenario {
     }
 
     /// The prepared rig.
-    #[must_use]
     pub fn rig(&self) -> &Rig {
         &self.prepared
     }

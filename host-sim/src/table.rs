@@ -27,7 +27,6 @@ pub struct TrackingRow {
 
 impl TrackingRow {
     /// Figures of a run.
-    #[must_use]
     pub fn of(mode: &str, frequency: f64, tracking: &Tracking) -> Self {
         let mut squares = [0.0; LEGS];
         let mut peak = 0.0_f64;
@@ -62,19 +61,16 @@ pub struct TrackingTable {
 
 impl TrackingTable {
     /// A run, if it was made.
-    #[must_use]
     pub fn row(&self, mode: &str, frequency: f64) -> Option<&TrackingRow> {
         self.rows.iter().find(|row| row.mode == mode && row.frequency_hz == frequency)
     }
 
     /// Its error, nm.
-    #[must_use]
     pub fn rmse_nm(&self, mode: &str, frequency: f64) -> Option<f64> {
         self.row(mode, frequency).map(|row| row.rmse_nm)
     }
 
     /// CSV, one line per run.
-    #[must_use]
     pub fn to_csv(&self) -> String {
         let mut out = String::from("mode,frequency_Hz,rmse_nm,peak_nm");
         for leg in 0..LEGS {
@@ -92,7 +88,6 @@ impl TrackingTable {
     }
 
     /// Text: a line per mode, a column per frequency, nm rms; the coverage below.
-    #[must_use]
     pub fn to_text(&self) -> String {
         let mut modes: Vec<&str> = Vec::new();
         let mut frequencies: Vec<f64> = Vec::new();
@@ -139,7 +134,6 @@ pub struct Line {
 
 impl Line {
     /// Least squares through the points; `None` with fewer than two different x.
-    #[must_use]
     pub fn fit(points: &[(f64, f64)]) -> Option<Self> {
         let count = points.len() as f64;
         let mean_x = points.iter().map(|(x, _)| x).sum::<f64>() / count;
@@ -193,7 +187,6 @@ impl LinearityTable {
     }
 
     /// CSV, one line per frequency.
-    #[must_use]
     pub fn to_csv(&self) -> String {
         let mut out = String::from("frequency_Hz,gain_ratio,offset_um,relative_slope\n");
         for row in &self.rows {
@@ -204,7 +197,6 @@ impl LinearityTable {
     }
 
     /// Text, one line per frequency.
-    #[must_use]
     pub fn to_text(&self) -> String {
         let mut out = String::from("        Hz    slope/model   offset um   slope/first\n");
         for row in &self.rows {

@@ -31,31 +31,26 @@ pub struct Trace {
 
 impl Trace {
     /// An empty trace of a controller.
-    #[must_use]
     pub fn new(description: Description) -> Self {
         Self { description, words: Vec::new() }
     }
 
     /// Whose run it is.
-    #[must_use]
     pub fn description(&self) -> &Description {
         &self.description
     }
 
     /// Words per row: inputs, outputs, digest.
-    #[must_use]
     pub fn width(&self) -> usize {
         self.description.input_names.len() + self.description.output_names.len() + 1
     }
 
     /// Number of ticks.
-    #[must_use]
     pub fn len(&self) -> usize {
         self.words.len() / self.width()
     }
 
     /// Whether no tick was recorded.
-    #[must_use]
     pub fn is_empty(&self) -> bool {
         self.words.is_empty()
     }
@@ -66,7 +61,6 @@ impl Trace {
     }
 
     /// All words, row after row.
-    #[must_use]
     pub fn words(&self) -> &[u64] {
         &self.words
     }
@@ -91,7 +85,6 @@ impl Trace {
     }
 
     /// The file's bytes.
-    #[must_use]
     pub fn to_bytes(&self) -> Vec<u8> {
         let mut text = self.description.to_text().into_bytes();
         text.resize(text.len().next_multiple_of(8), b'\n');
@@ -110,7 +103,6 @@ impl Trace {
 
     /// CSV for reading and plotting: numbers as shortest decimals that give the same bits, integers unchanged, the
     /// digest in hexadecimal; units in the column names.
-    #[must_use]
     pub fn to_csv(&self) -> String {
         let titles: Vec<String> = std::iter::once("tick".to_owned()).chain(self.columns().map(title)).collect();
         let kinds: Vec<WordKind> = self.columns().map(WordKind::of).collect();

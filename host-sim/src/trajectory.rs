@@ -83,7 +83,6 @@ impl PaperLeg {
     }
 
     /// Displacement in m at `time` (s).
-    #[must_use]
     pub fn displacement(&self, time: f64) -> f64 {
         let scaled = self.scaled(time);
         let um = if scaled <= Self::RAMP_END * (1.0 + Self::SLACK) {

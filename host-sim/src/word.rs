@@ -16,7 +16,6 @@ pub enum Scalar {
 
 impl Scalar {
     /// From the number of bits, 32 or 64.
-    #[must_use]
     pub fn from_bits(bits: u32) -> Option<Self> {
         match bits {
             32 => Some(Self::F32),
@@ -26,7 +25,6 @@ impl Scalar {
     }
 
     /// 32 or 64.
-    #[must_use]
     pub fn bits(self) -> u32 {
         match self {
             Self::F32 => 32,
@@ -35,7 +33,6 @@ impl Scalar {
     }
 
     /// Word of `value`, rounded to this type.
-    #[must_use]
     pub fn encode(self, value: f64) -> u64 {
         match self {
             Self::F32 => u64::from((value as f32).to_bits()),
@@ -44,7 +41,6 @@ impl Scalar {
     }
 
     /// Value of a word. Bits above an f32 are ignored.
-    #[must_use]
     pub fn decode(self, word: u64) -> f64 {
         match self {
             Self::F32 => f64::from(f32::from_bits(word as u32)),
@@ -54,7 +50,6 @@ impl Scalar {
 
     /// How many representable numbers lie between two words (1 for neighbours, 0 for equal ones; −0 and +0 are neighbours).
     /// `None` if either is NaN, or has bits set above its type.
-    #[must_use]
     pub fn ulps(self, a: u64, b: u64) -> Option<u64> {
         if self == Self::F32 && (a | b) >> 32 != 0 {
             return None;
@@ -112,7 +107,6 @@ const INTEGERS: [&str; 25] = [
 
 impl WordKind {
     /// Kind of the word called `name`, which may end in an index: `voltage[2]`.
-    #[must_use]
     pub fn of(name: &str) -> Self {
         let stem = name.split('[').next().unwrap_or(name);
         if INTEGERS.contains(&stem) { Self::Integer } else { Self::Real }
@@ -122,7 +116,6 @@ impl WordKind {
 /// The bits of a status word as text, joined by `+`; empty if none is set. Both kinds of controller have the same bits;
 /// legs and gauges count from 0, as words do. A bit without a meaning is shown by its number, so that a word of another
 /// version does not look good.
-#[must_use]
 pub fn status_words(status: u32) -> String {
     let mut words = Vec::new();
     let mut legs = |first: u32, what: &str, then: &str| {

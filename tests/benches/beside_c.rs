@@ -14,7 +14,7 @@ use controller::body::PLATFORM;
 use specgen::compile::compile;
 use specgen_runtime::snapshot::Field;
 use specgen_runtime::{Motion, Platform, Real};
-use specgen_tests::repository;
+use specgen_tests::{motions, repository};
 
 const MOTIONS: usize = 1024;
 const ROUNDS: usize = 200;
@@ -200,17 +200,6 @@ int main(int n, char **names) {{
     )
 }
 
-/// Motions of a moving platform within its workspace.
-fn motions() -> Vec<Motion<f64>> {
-    let mut state = 1_u64;
-    let mut unit = || {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (state >> 33) as f64 / (1u64 << 30) as f64 - 1.0
-    };
-    let mut six = |scale: f64| -> [f64; 6] { std::array::from_fn(|_| scale * unit()) };
-    (0..MOTIONS).map(|_| Motion { pose: six(5e-5), rate: six(0.1), acceleration: six(10.0) }).collect()
-}
-
 /// The committed controller's, whose constants are in its code as those of the C are.
 #[inline(never)]
 fn rust(motion: &Motion<f64>) -> [f64; 6] {
@@ -246,7 +235,7 @@ fn main() {
     let folder = tempfile::tempdir().expect("a folder");
     let folder = folder.path();
     std::fs::write(folder.join("kernel.c"), program(&traced(&dynamics.platform()))).expect("a file");
-    let motions = motions();
+    let motions = motions(MOTIONS, 5e-5);
     let rows = motions.iter().flat_map(|m| [&m.pose, &m.rate, &m.acceleration]).flatten();
     std::fs::write(folder.join("in"), bytes(rows)).expect("a file");
 

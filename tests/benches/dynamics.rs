@@ -7,7 +7,7 @@ use specgen::compile::compile;
 use specgen::lower::{self, GRAVITY};
 use specgen::model::Model;
 use specgen_runtime::Motion;
-use specgen_tests::repository;
+use specgen_tests::{motions, repository};
 
 fn main() {
     divan::main();
@@ -15,17 +15,6 @@ fn main() {
 
 fn model() -> Model {
     compile(&repository().join("specs/reference.toml")).expect("the reference spec compiles").model
-}
-
-/// Motions of a moving platform.
-fn motions() -> Vec<Motion<f64>> {
-    let mut state = 1_u64;
-    let mut unit = || {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (state >> 33) as f64 / (1u64 << 30) as f64 - 1.0
-    };
-    let mut six = |scale: f64| -> [f64; 6] { std::array::from_fn(|_| scale * unit()) };
-    (0..1024).map(|_| Motion { pose: six(1e-3), rate: six(0.1), acceleration: six(10.0) }).collect()
 }
 
 /// Times `compute` on every motion.
@@ -41,14 +30,14 @@ fn each(bencher: Bencher, motions: &[Motion<f64>], compute: impl Fn(&Motion<f64>
 #[divan::bench]
 fn leg_forces(bencher: Bencher) {
     let platform = lower::platform(&model()).expect("a sound geometry");
-    each(bencher, &motions(), |motion| black_box(platform.leg_forces(motion))[0]);
+    each(bencher, &motions(1024, 1e-3), |motion| black_box(platform.leg_forces(motion))[0]);
 }
 
 /// With displacements and a wrench, as the tick takes it.
 #[divan::bench]
 fn load(bencher: Bencher) {
     let platform = lower::platform(&model()).expect("a sound geometry");
-    each(bencher, &motions(), |motion| black_box(platform.load(motion, black_box(Some(&[1.0; 6])))).force[0]);
+    each(bencher, &motions(1024, 1e-3), |motion| black_box(platform.load(motion, black_box(Some(&[1.0; 6])))).force[0]);
 }
 
 /// The same forces as one writes them with nalgebra from the errata: M and C ḣ + G by summing over the legs, LU of Jᵀ.
@@ -56,7 +45,7 @@ fn load(bencher: Bencher) {
 fn leg_forces_in_plain_nalgebra(bencher: Bencher) {
     let plain = Plain::new(&model());
     let kernel = lower::platform(&model()).expect("a sound geometry");
-    let motions = motions();
+    let motions = motions(1024, 1e-3);
     for motion in &motions {
         let difference = plain.leg_forces(motion) - Vector6::from(kernel.leg_forces(motion));
         assert!(difference.norm() < 1e-10, "both compute the same");

@@ -2,19 +2,24 @@
 //! noisy. A whole tick is one of the emitted host library, words in and out, under the closed-loop record of the exercise;
 //! its parts are the runtime's kernels with the constants of the reference platform.
 
+use std::marker::PhantomData;
+
 use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
 use host_sim::controller::{Controller, TickController};
 use nalgebra::{Matrix6, Rotation3, Vector3, Vector6};
-use specgen::ir;
+use specgen::ir::scalar::Rounding;
+use specgen::ir::{self, constants};
 use specgen::model::Probe;
 use specgen::verify;
+use specgen_runtime::NotchState;
 use specgen_runtime::linear::transform;
-use specgen_runtime::{Gauges, NotchState, Section};
 use specgen_tests::Emitted;
 
 /// Ticks from reset on that are timed: the way to the bias pose, then tracking.
 const TICKS: u32 = 8192;
+/// Constants stay in double precision.
+const NUMBERS: Rounding<f64> = Rounding(PhantomData);
 
 fn main() {
     divan::main();
@@ -60,32 +65,24 @@ fn task(emitted: &Emitted) -> &ir::TaskSpace {
     emitted.compiled.ir.task_space.as_ref().expect("a controller in task space")
 }
 
-fn gauges(sensing: &ir::Sensing) -> Gauges<'_, f64> {
-    Gauges {
-        direction: sensing.direction,
-        normal: sensing.normal,
-        skew: sensing.skew,
-        pierced: sensing.pierced,
-        inverse: sensing.inverse,
-        curvature: sensing.curvature,
-        passes: sensing.passes as usize,
-        arc_sine: &sensing.arc_sine,
-        arc_tangent: &sensing.arc_tangent,
-    }
+/// Times what is computed of each of the readings.
+fn each<T>(bencher: Bencher, all: &[[f64; 6]], mut compute: impl FnMut(&[f64; 6]) -> T) {
+    bencher.counter(ItemsCount::new(all.len())).bench_local(|| {
+        for one in all {
+            black_box(compute(black_box(one)));
+        }
+    });
 }
 
 /// The modal notch on a pose error: into modes, six sections, and back.
 #[divan::bench]
 fn notch(bencher: Bencher) {
     let (emitted, readings) = readings("bench-notch");
-    let notch = task(&emitted).law.notch.clone().expect("a notch");
-    let sections = notch.sections.map(|ir::Section { depth, a }| Section { depth, a });
+    let notch = constants::notch(&NUMBERS, &task(&emitted).law).expect("a notch");
     let mut state = NotchState::new();
-    bencher.counter(ItemsCount::new(readings.len())).bench_local(|| {
-        for error in &readings {
-            let modal = state.filter(&sections, &transform(&notch.pose_to_modes, black_box(error)));
-            black_box(transform(&notch.modes_to_pose, &modal));
-        }
+    each(bencher, &readings, |error| {
+        let modal = state.filter(&notch.sections, &transform(&notch.pose_to_modes, error));
+        transform(&notch.modes_to_pose, &modal)
     });
 }
 
@@ -93,19 +90,15 @@ fn notch(bencher: Bencher) {
 #[divan::bench]
 fn sensing(bencher: Bencher) {
     let (emitted, readings) = readings("bench-sensing");
-    let gauges = gauges(&task(&emitted).sensing);
-    bencher.counter(ItemsCount::new(readings.len())).bench_local(|| {
-        for readings in &readings {
-            black_box(gauges.pose(black_box(readings)));
-        }
-    });
+    let gauges = constants::gauges(&NUMBERS, &task(&emitted).sensing);
+    each(bencher, &readings, |readings| gauges.pose(readings));
 }
 
 /// The same as one writes it first, with nalgebra: three Newton steps, each with a Jacobian by central differences and LU.
 #[divan::bench]
 fn sensing_by_plain_newton(bencher: Bencher) {
     let (emitted, readings) = readings("bench-newton");
-    let gauges = gauges(&task(&emitted).sensing);
+    let gauges = constants::gauges(&NUMBERS, &task(&emitted).sensing);
     let model = &emitted.compiled.model;
     let probes = &model.task_space.as_ref().expect("a controller in task space").probes;
     let plain = Plain { probes, height: model.geometry.height };
@@ -113,11 +106,7 @@ fn sensing_by_plain_newton(bencher: Bencher) {
         let difference = plain.pose(readings) - Vector6::from(gauges.pose(readings));
         assert!(difference.norm() < 1e-12, "both find the same pose: {difference}");
     }
-    bencher.counter(ItemsCount::new(readings.len())).bench_local(|| {
-        for readings in &readings {
-            black_box(plain.pose(black_box(readings)));
-        }
-    });
+    each(bencher, &readings, |readings| plain.pose(readings));
 }
 
 struct Plain<'a> {

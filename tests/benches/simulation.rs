@@ -20,6 +20,15 @@ fn main() {
     divan::main();
 }
 
+/// Times what is computed in every tick.
+fn every_tick<T>(bencher: Bencher, mut compute: impl FnMut(usize) -> T) {
+    bencher.counter(ItemsCount::new(TICKS)).bench_local(|| {
+        for tick in 0..TICKS {
+            black_box(compute(tick));
+        }
+    });
+}
+
 /// The plant alone under six voltages that change every tick, in long steps or in small ones.
 #[divan::bench(args = ["long", "small"])]
 fn plant(bencher: Bencher, steps: &str) {
@@ -55,11 +64,7 @@ fn preparation(bencher: Bencher) {
 fn gauges(bencher: Bencher) {
     let emitted = Emitted::new("bench-gauges", "reference.toml", &[]);
     let mut rig = scenario(&emitted.compiled, &LegParameters::reference(), 1).rig().clone();
-    bencher.counter(ItemsCount::new(TICKS)).bench_local(|| {
-        for _ in 0..TICKS {
-            black_box(rig.read_gauges());
-        }
-    });
+    every_tick(bencher, |_| rig.read_gauges());
 }
 
 /// Noise of the force sensor: six numbers a tick.
@@ -67,22 +72,14 @@ fn gauges(bencher: Bencher) {
 fn force_sensor(bencher: Bencher) {
     let emitted = Emitted::new("bench-force", "reference.toml", &[]);
     let mut rig = scenario(&emitted.compiled, &LegParameters::reference(), 1).rig().clone();
-    bencher.counter(ItemsCount::new(TICKS)).bench_local(|| {
-        for _ in 0..TICKS {
-            black_box(rig.read_wrench());
-        }
-    });
+    every_tick(bencher, |_| rig.read_wrench());
 }
 
 /// Set-points of the paper's case 1.
 #[divan::bench]
 fn set_points(bencher: Bencher) {
     let trajectory = PaperPose::corrected(PaperPath::Case1, 1.25);
-    bencher.counter(ItemsCount::new(TICKS)).bench_local(|| {
-        for tick in 0..TICKS {
-            black_box(trajectory.target(black_box(tick as f64 * INTERVAL)));
-        }
-    });
+    every_tick(bencher, |tick| trajectory.target(black_box(tick as f64 * INTERVAL)));
 }
 
 /// The controller alone, words in and out, at rest.
@@ -114,10 +111,8 @@ fn whole_loop(bencher: Bencher, steps: &str) {
     if steps.ends_with("traced") {
         bench.record();
     }
-    bencher.counter(ItemsCount::new(TICKS)).bench_local(|| {
-        for tick in 0..TICKS {
-            let target = trajectory.target(tick as f64 * INTERVAL);
-            black_box(bench.tick(&Request::stream(target)).expect("finite voltages"));
-        }
+    every_tick(bencher, |tick| {
+        let target = trajectory.target(tick as f64 * INTERVAL);
+        bench.tick(&Request::stream(target)).expect("finite voltages")
     });
 }

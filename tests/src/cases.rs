@@ -38,7 +38,6 @@ impl Case {
     }
 
     /// The last text with a sign, if there is one.
-    #[must_use]
     pub fn one(&self, sign: char) -> Option<&str> {
         self.all(sign).next_back()
     }
@@ -47,7 +46,6 @@ impl Case {
     ///
     /// # Panics
     /// If a change finds nothing to replace.
-    #[must_use]
     pub fn edited(&self, text: &str) -> String {
         self.all('-').zip(self.all('+')).fold(text.to_owned(), |text, (old, new)| replaced(&text, old, new))
     }
@@ -57,7 +55,6 @@ impl Case {
 ///
 /// # Panics
 /// If there is none.
-#[must_use]
 pub fn replaced(text: &str, old: &str, new: &str) -> String {
     assert!(text.contains(old), "no `{old}`");
     text.replacen(old, new, 1)
@@ -67,7 +64,6 @@ pub fn replaced(text: &str, old: &str, new: &str) -> String {
 ///
 /// # Panics
 /// If there is no such file, or no case in it.
-#[must_use]
 pub fn read(file: &Path) -> Vec<(Case, String)> {
     let text = fs::read_to_string(file).unwrap_or_else(|error| panic!("{}: {error}", file.display()));
     let blocks = text.trim_end().split("\n\n").filter(|block| !block.starts_with('#'));

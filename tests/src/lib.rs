@@ -31,9 +31,9 @@ pub use specgen::target::skipped;
 use specgen::target::{self, Image, ReplayResult};
 use specgen::verify;
 use specgen::workspace;
+use specgen_runtime::Motion;
 
 /// The repository.
-#[must_use]
 pub fn repository() -> PathBuf {
     let here = Path::new(env!("CARGO_MANIFEST_DIR"));
     here.parent().unwrap_or(here).to_owned()
@@ -43,7 +43,6 @@ pub fn repository() -> PathBuf {
 ///
 /// # Panics
 /// If it cannot be created.
-#[must_use]
 pub fn scratch(name: &str) -> PathBuf {
     static MADE: AtomicU32 = AtomicU32::new(0);
     let number = MADE.fetch_add(1, Ordering::Relaxed);
@@ -54,20 +53,17 @@ pub fn scratch(name: &str) -> PathBuf {
 }
 
 /// Folder of a board's image and spec, which are kept for later steps.
-#[must_use]
 pub fn kept(board: &str) -> PathBuf {
     builds().join("boards").join(board)
 }
 
 /// Target folder for images. It is shared, so that common dependencies are compiled once, but not used by two tests at the same
 /// time, because cargo would make one wait for the other.
-#[must_use]
 pub fn image_target() -> PathBuf {
     builds().join(format!("build-{}", worker()))
 }
 
 /// Length of a test that benefits from more data: `short` normally, `long` if `SPECGEN_FULL` is set, as by `cargo xtask test --full`.
-#[must_use]
 pub fn length<T>(short: T, long: T) -> T {
     if std::env::var_os("SPECGEN_FULL").is_some() { long } else { short }
 }
@@ -77,7 +73,6 @@ pub fn length<T>(short: T, long: T) -> T {
 ///
 /// # Panics
 /// If that spec stores none.
-#[must_use]
 pub fn active_damping() -> String {
     let text = fs::read_to_string(repository().join("specs/features/platform-damping.toml")).expect("a spec");
     let (_, design) = text.split_once("[control.design]\n").expect("a stored design");
@@ -89,15 +84,24 @@ pub fn active_damping() -> String {
 }
 
 /// Edit of the reference spec: with [`active_damping`].
-#[must_use]
 pub fn damped() -> (&'static str, &'static str) {
     static DAMPED: OnceLock<String> = OnceLock::new();
     let notch = "notch_damping   = 1.0";
     (notch, DAMPED.get_or_init(|| format!("{notch}\n{}", active_damping())))
 }
 
+/// Motions of a platform with displacements and angles up to `size`, m and rad.
+pub fn motions(count: usize, size: f64) -> Vec<Motion<f64>> {
+    let mut state = 1_u64;
+    let mut unit = || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 33) as f64 / (1u64 << 30) as f64 - 1.0
+    };
+    let mut six = |scale: f64| -> [f64; 6] { std::array::from_fn(|_| scale * unit()) };
+    (0..count).map(|_| Motion { pose: six(size), rate: six(0.1), acceleration: six(10.0) }).collect()
+}
+
 /// The larger of two errors. Unlike `f64::max` it keeps a NaN, which no bound admits.
-#[must_use]
 pub fn worse(a: f64, b: f64) -> f64 {
     if a.is_nan() || a >= b { a } else { b }
 }
@@ -171,7 +175,6 @@ impl Emitted {
     ///
     /// # Panics
     /// If an edit finds nothing to replace, or the spec is refused.
-    #[must_use]
     pub fn new(name: &str, spec: &str, edits: &[(&str, &str)]) -> Self {
         Self::with_records(name, spec, edits, &[])
     }
@@ -180,7 +183,6 @@ impl Emitted {
     ///
     /// # Panics
     /// As [`Emitted::new`].
-    #[must_use]
     pub fn with_records(name: &str, spec: &str, edits: &[(&str, &str)], records: &[(&str, String)]) -> Self {
         // Tests of a module share specs.
         static COMPILED: Mutex<BTreeMap<String, Arc<Compilation>>> = Mutex::new(BTreeMap::new());
@@ -197,7 +199,6 @@ impl Emitted {
     ///
     /// # Panics
     /// As [`Emitted::new`].
-    #[must_use]
     pub fn reference(name: &str) -> Self {
         let path = repository().join("specs/reference.toml");
         let compiled = compile(&path).unwrap_or_else(|refused| panic!("{name} is refused: {:#?}", refused.findings));
@@ -205,7 +206,6 @@ impl Emitted {
     }
 
     /// A compiled spec.
-    #[must_use]
     pub fn of(name: &str, compiled: Arc<Compilation>) -> Self {
         Self { compiled, name: name.to_owned(), dir: OnceLock::new() }
     }
@@ -214,7 +214,6 @@ impl Emitted {
     ///
     /// # Panics
     /// If it cannot be written.
-    #[must_use]
     pub fn dir(&self) -> &Path {
         self.dir.get_or_init(|| {
             let dir = scratch(&self.name);
@@ -227,7 +226,6 @@ impl Emitted {
     ///
     /// # Panics
     /// If cargo cannot be run.
-    #[must_use]
     pub fn check(&self, packages: &[&str]) -> Output {
         let stage = Stage::of(self.dir());
         let mut cargo = Command::new(env!("CARGO"));
@@ -239,7 +237,6 @@ impl Emitted {
     ///
     /// # Panics
     /// If it does not build.
-    #[must_use]
     pub fn library(&self) -> PathBuf {
         let stage = Stage::of(self.dir());
         target::host::build_library(&stage.folder, &image_target()).unwrap_or_else(|error| panic!("{error}"))
@@ -249,7 +246,6 @@ impl Emitted {
     ///
     /// # Panics
     /// If it does not build or load.
-    #[must_use]
     pub fn controller(&self) -> Controller {
         Controller::load(&self.library()).unwrap_or_else(|error| panic!("{error}"))
     }
@@ -258,7 +254,6 @@ impl Emitted {
     ///
     /// # Panics
     /// If the compiled spec cannot be run.
-    #[must_use]
     pub fn at_run_time(&self) -> Controller {
         specgen::run_time::controller(&self.compiled.ir).unwrap_or_else(|error| panic!("{error}"))
     }
@@ -267,7 +262,6 @@ impl Emitted {
     ///
     /// # Panics
     /// If it does not build.
-    #[must_use]
     pub fn image(&self, mcu: Mcu) -> Option<Image> {
         target::found_or_skipped(target::available()).unwrap_or_else(|error| panic!("{error}"))?;
         let stage = Stage::of(self.dir());
@@ -278,7 +272,6 @@ impl Emitted {
     ///
     /// # Panics
     /// If the controller lacks a word.
-    #[must_use]
     pub fn stimulus(&self, description: &Description, pose: bool, rows: usize, seed: u64) -> InputRecording {
         let ir = &self.compiled.ir;
         let stroke = self.compiled.model.actuator.stroke;
@@ -296,7 +289,6 @@ impl Emitted {
     ///
     /// # Panics
     /// If the controller is not one in task space.
-    #[must_use]
     pub fn platform_stimulus(&self, description: &Description, rows: usize, seed: u64) -> InputRecording {
         let ir = &self.compiled.ir;
         let task = self.compiled.model.task_space.as_ref().expect("a controller in task space");
@@ -315,7 +307,6 @@ impl Emitted {
 ///
 /// # Panics
 /// If an edit finds nothing to replace, or the spec is refused.
-#[must_use]
 pub fn compile_edited(name: &str, spec: &str, edits: &[(&str, &str)], more: &[(&str, String)]) -> Compilation {
     let specs = repository().join("specs");
     let mut text = fs::read_to_string(specs.join(spec)).expect("a spec of this repository");
@@ -345,7 +336,6 @@ pub fn compile_edited(name: &str, spec: &str, edits: &[(&str, &str)], more: &[(&
 ///
 /// # Panics
 /// If there is no such spec, or an edit finds nothing to replace.
-#[must_use]
 pub fn edited(spec: &str, edits: &[(&str, &str)]) -> String {
     let text = fs::read_to_string(repository().join("specs").join(spec)).expect("a spec of this repository");
     edits.iter().fold(text, |text, (old, new)| cases::replaced(&text, old, new))
@@ -393,7 +383,6 @@ pub type Row = (Vec<u64>, Vec<u64>, u64);
 ///
 /// # Panics
 /// If the image does not run.
-#[must_use]
 pub fn machine_difference(image: &Image, config: &[u64], rows: &[Row]) -> (Option<usize>, ReplayResult) {
     let inputs: Vec<Vec<u64>> = rows.iter().map(|(input, ..)| input.clone()).collect();
     let result = target::replay_machine(image, config, &inputs, Duration::from_secs(600));
@@ -418,7 +407,6 @@ pub fn assert_same_machine(what: &str, image: &Image, config: &[u64], rows: &[Ro
 ///
 /// # Panics
 /// If the spec is of six legs.
-#[must_use]
 pub fn scenario(compiled: &Compilation, leg: &LegParameters, seed: u64) -> PlatformScenario {
     let task = compiled.model.task_space.as_ref().expect("a platform");
     let specimen = machine::specimen(&compiled.model, task, leg, Some(seed));
@@ -426,7 +414,6 @@ pub fn scenario(compiled: &Compilation, leg: &LegParameters, seed: u64) -> Platf
 }
 
 /// Three classes of legs: plays with creep, Bouc-Wen with creep over five decades, rate-dependent plays with the same creep.
-#[must_use]
 pub fn leg_class(number: u64) -> LegParameters {
     let [plays, bouc_wen] = [LegParameters::reference(), LegParameters::bouc_wen()];
     match number % 3 {
@@ -446,7 +433,6 @@ pub fn leg_class(number: u64) -> LegParameters {
 ///
 /// # Panics
 /// If the controller has no such word.
-#[must_use]
 pub fn column(trace: &Trace, name: &str) -> Vec<f64> {
     let description = trace.description();
     let place = description.input_names.len() + description.output(name).expect("an output word");
@@ -457,7 +443,6 @@ pub fn column(trace: &Trace, name: &str) -> Vec<f64> {
 ///
 /// # Panics
 /// If the controller has no such word.
-#[must_use]
 pub fn integers(trace: &Trace, name: &str) -> Vec<u64> {
     let description = trace.description();
     let place = description.input_names.len() + description.output(name).expect("an output word");
@@ -468,7 +453,6 @@ pub fn integers(trace: &Trace, name: &str) -> Vec<u64> {
 ///
 /// # Panics
 /// If there are none, or one is not text.
-#[must_use]
 pub fn sources(dir: &Path) -> BTreeMap<String, String> {
     let files = files(dir);
     assert!(!files.is_empty(), "no file in {}", dir.display());

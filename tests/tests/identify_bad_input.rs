@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use crate::identify_support::{Drive, generator};
+use crate::identify_support::{self, Drive, generator};
 use rand_chacha::rand_core::Rng;
 use specgen::diagnostic::{Diagnostic, Place, Severity};
 use specgen::identify::{Options, Reading, Record, identify, read_file, read_record};
@@ -50,10 +50,7 @@ fn errors(bytes: &[u8]) -> Vec<Diagnostic> {
 
 /// Asserts one finding whose code and message fit, and returns its line.
 fn expect(all: &[Diagnostic], code: &str, text: &str) -> Option<usize> {
-    let fitting = all.iter().find(|d| d.code == code && d.message.contains(text));
-    let found = fitting.unwrap_or_else(|| panic!("no {code} with `{text}` in {all:#?}"));
-    assert!(!found.help.is_empty(), "{found:?}");
-    match &found.place {
+    match &identify_support::expect(all, code, text).place {
         Place::File { line, .. } => *line,
         other => panic!("{other:?}"),
     }

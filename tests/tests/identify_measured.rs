@@ -14,6 +14,11 @@ use specgen_tests::length;
 
 const DRIVE: [f64; 2] = [-90.0, 90.0];
 
+/// Reversal curves and another record, to predict, of one actuator.
+fn curves_and_sine() -> Option<(Record, Record)> {
+    Some((measured("forc-20hz.csv")?, measured("validate-growing-sine-5hz.csv")?))
+}
+
 fn found(record: &Record, options: &Options) -> Identification {
     let result = identify(record, options).unwrap_or_else(|d| panic!("{d:#?}"));
     assert!(result.warnings.is_empty(), "{:#?}", result.warnings);
@@ -37,9 +42,7 @@ fn predicted(table: &EverettTable, record: &Record, dead_time: f64) -> Predictio
 
 #[test]
 fn measured_record_is_fitted_and_predicts_another_one() {
-    let (Some(forc), Some(sine)) = (measured("forc-20hz.csv"), measured("validate-growing-sine-5hz.csv")) else {
-        return;
-    };
+    let Some((forc, sine)) = curves_and_sine() else { return };
     let result = found(&forc, &Options::new(32, DRIVE));
     let report = &result.report;
     assert_eq!(report.branches, Branches::Descending);
@@ -58,9 +61,7 @@ fn measured_record_is_fitted_and_predicts_another_one() {
 /// The limits hold without the dead time too, which a static table cannot know.
 #[test]
 fn the_table_alone_stays_within_the_limits() {
-    let (Some(forc), Some(sine)) = (measured("forc-20hz.csv"), measured("validate-growing-sine-5hz.csv")) else {
-        return;
-    };
+    let Some((forc, sine)) = curves_and_sine() else { return };
     let result = found(&forc, &Options { dead_time: DeadTime::Fixed(0.0), ..Options::new(32, DRIVE) });
     assert!(result.report.fit_rms_percent <= 0.5, "fit {} %", result.report.fit_rms_percent);
     let validation = predicted(&result.table, &sine, 0.0);
@@ -69,9 +70,7 @@ fn the_table_alone_stays_within_the_limits() {
 
 #[test]
 fn a_table_without_hysteresis_fails_the_limits() {
-    let (Some(forc), Some(sine)) = (measured("forc-20hz.csv"), measured("validate-growing-sine-5hz.csv")) else {
-        return;
-    };
+    let Some((forc, sine)) = curves_and_sine() else { return };
     let result = found(&forc, &Options::new(32, DRIVE));
     let mut straight = result.table.clone();
     for up in 1..=32 {
@@ -87,9 +86,7 @@ fn a_table_without_hysteresis_fails_the_limits() {
 /// frequency of the drive.
 #[test]
 fn spikes_hum_and_a_step_do_not_spoil_a_measured_record() {
-    let (Some(forc), Some(sine)) = (measured("forc-20hz.csv"), measured("validate-growing-sine-5hz.csv")) else {
-        return;
-    };
+    let Some((forc, sine)) = curves_and_sine() else { return };
     let options = Options::new(32, DRIVE);
     let clean = found(&forc, &options);
     let error = predicted(&clean.table, &sine, clean.report.dead_time).rms_percent;

@@ -1,18 +1,19 @@
 //! Set-points as they are compiled: trajectories against the host's own formulas, tables against their rows, and what is refused or
 //! warned of.
 
+use std::marker::PhantomData;
+
 use host_sim::trajectory::{PaperPath, PaperPose, PoseTrajectory, Reading, Step};
 use specgen::diagnostic::Diagnostic;
-use specgen::ir::{self, Scalar};
+use specgen::ir::scalar::{Numbers as _, Rounding, kept};
+use specgen::ir::{self, Scalar, constants};
 use specgen::lower::setpoint;
 use specgen::model::{self, Model, Trajectory, TrajectoryKind};
 use specgen::spec::{self, SpecSource};
 use specgen::waveform::{self, Waveform};
 use specgen_runtime::Real;
 use specgen_runtime::setpoint as runtime;
-use specgen_runtime::setpoint::{
-    BUSY, Command, CommandKind, Generator, MoveLimits, Parallel, Setpoints, StopLimits, Target,
-};
+use specgen_runtime::setpoint::{BUSY, Command, CommandKind, Generator, Parallel, Setpoints, Target};
 use specgen_tests::{repository, worse};
 
 pub const F32: (&str, &str) = ("scalar = \"f64\"", "scalar = \"f32\"");
@@ -45,74 +46,29 @@ fn paper(path: model::PaperPath, as_printed: bool, frequency: f64) -> Trajectory
 
 /// The plan that the emitter prints, as a value.
 fn plan<T: Real>(model: &Model, setpoints: &ir::Setpoints) -> Setpoints<T, Parallel> {
-    let n = |value: f64| T::from_f64(value);
-    let six = |values: [f64; 6]| values.map(T::from_f64);
+    let numbers = &Rounding(PhantomData::<T>);
     let trajectory = |trajectory: &ir::Trajectory| match &trajectory.path {
-        ir::Path::Segments { start, segments, ticks, end } => {
-            let segments: Vec<runtime::Segment<T>> = segments
-                .iter()
-                .map(|segment| runtime::Segment {
-                    first: segment.first as i32,
-                    per_tick: n(segment.per_tick),
-                    per_second: n(segment.per_second),
-                    phase: segment.phase,
-                    phase_step: segment.phase_step,
-                    angular: n(segment.angular),
-                    axes: segment.axes.map(|axis| runtime::Axis {
-                        place: n(axis.place),
-                        slope: n(axis.slope),
-                        sine: axis.sine.map(n),
-                        cosine: axis.cosine.map(n),
-                    }),
-                })
-                .collect();
-            runtime::Trajectory::Segments {
-                start: six(*start),
-                segments: segments.leak(),
-                ticks: *ticks as i32,
-                end: six(*end),
-            }
-        }
+        ir::Path::Segments { start, segments, ticks, end } => runtime::Trajectory::Segments {
+            start: numbers.vector(start),
+            segments: kept(segments.iter().map(|segment| constants::segment(numbers, segment))),
+            ticks: *ticks as i32,
+            end: numbers.vector(end),
+        },
         ir::Path::Table { rows, row_ticks, per_tick, per_second, bend_rate, repeat } => {
-            let rows: Vec<runtime::Row<T>> =
-                rows.iter().map(|row| runtime::Row { pose: six(row.pose), bend: six(row.bend) }).collect();
             runtime::Trajectory::Table(runtime::Table {
-                rows: rows.leak(),
+                rows: kept(rows.iter().map(|row| constants::row(numbers, row))),
                 row_ticks: *row_ticks as i32,
-                per_tick: n(*per_tick),
-                per_second: n(*per_second),
-                bend_rate: n(*bend_rate),
+                per_tick: numbers.real(*per_tick),
+                per_second: numbers.real(*per_second),
+                bend_rate: numbers.real(*bend_rate),
                 repeat: *repeat,
             })
         }
     };
-    let trajectories: Vec<runtime::Trajectory<T>> = setpoints.trajectories.iter().map(trajectory).collect();
+    let trajectories = kept(setpoints.trajectories.iter().map(trajectory));
     let [tx, ty, tz] = model.workspace.translation;
     let [rx, ry, rz] = model.workspace.rotation;
-    Setpoints {
-        period: n(setpoints.period),
-        rate: n(setpoints.rate),
-        square_rate: n(setpoints.square_rate),
-        bias: six(setpoints.bias),
-        home: six(setpoints.home),
-        bound: six([tx, ty, tz, rx, ry, rz]),
-        limits: MoveLimits {
-            speed: six(setpoints.speed_limit),
-            acceleration: six(setpoints.acceleration_limit),
-            jerk: six(setpoints.jerk_limit),
-        },
-        stop: StopLimits {
-            acceleration: six(setpoints.stop_acceleration_limit),
-            jerk: six(setpoints.stop_jerk_limit),
-            shortest: setpoints.shortest_stop,
-        },
-        stream_step: six(setpoints.stream_step),
-        stream_rate: six(setpoints.stream_rate),
-        stream_acceleration: six(setpoints.stream_acceleration),
-        stale_ticks: setpoints.stale_ticks,
-        frames: Parallel,
-        trajectories: trajectories.leak(),
-    }
+    constants::setpoints(numbers, &[tx, ty, tz, rx, ry, rz], setpoints, Parallel, trajectories)
 }
 
 /// Every set-point of trajectory `selector` from its first tick to its last, without the bias.

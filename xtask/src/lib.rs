@@ -7,7 +7,6 @@ pub mod run;
 pub mod setup;
 
 /// The repository, the parent folder of this crate.
-#[must_use]
 pub fn root() -> PathBuf {
     let here = Path::new(env!("CARGO_MANIFEST_DIR"));
     here.parent().unwrap_or(here).to_owned()

@@ -27,7 +27,6 @@ pub struct Report {
 
 impl Report {
     /// A report of `total` steps.
-    #[must_use]
     pub fn new(total: usize) -> Self {
         Self { start: Instant::now(), total, steps: Vec::new() }
     }
@@ -42,13 +41,11 @@ impl Report {
     }
 
     /// Whether every step passed, and none was skipped.
-    #[must_use]
     pub fn is_whole(&self) -> bool {
         self.steps.iter().all(|(_, outcome, _)| matches!(outcome, Outcome::Passed))
     }
 
     /// Whether a step failed.
-    #[must_use]
     pub fn has_failed(&self) -> bool {
         self.steps.iter().any(|(_, outcome, _)| matches!(outcome, Outcome::Failed(_)))
     }
@@ -70,14 +67,12 @@ impl Report {
 }
 
 /// Minutes and seconds.
-#[must_use]
 pub fn clock(time: Duration) -> String {
     let seconds = time.as_secs();
     format!("{:2}:{:02}", seconds / 60, seconds % 60)
 }
 
 /// A call of cargo in the repository, the same cargo that runs this program.
-#[must_use]
 pub fn cargo(root: &Path, arguments: &[&str]) -> Command {
     let mut command = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
     command.current_dir(root).args(arguments);
@@ -85,7 +80,6 @@ pub fn cargo(root: &Path, arguments: &[&str]) -> Command {
 }
 
 /// Runs a command and shows its output; `fix` is advice for a failure.
-#[must_use]
 pub fn expect_success(mut command: Command, fix: &str) -> Outcome {
     match command.status() {
         Ok(status) if status.success() => Outcome::Passed,

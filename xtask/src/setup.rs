@@ -35,14 +35,12 @@ pub fn component(name: &str, subcommand: &str) -> Result<(), Outcome> {
 }
 
 /// Whether cargo's own compiler has the library for microcontrollers; the cross compiler may be another one.
-#[must_use]
 pub fn has_target() -> bool {
     let printed = Command::new("rustc").args(["--print", "target-libdir", "--target", TRIPLE]).output();
     printed.is_ok_and(|output| Path::new(String::from_utf8_lossy(&output.stdout).trim()).is_dir())
 }
 
 /// A failure, or a skip if the user allows missing tools.
-#[must_use]
 pub fn missing(why: String) -> Outcome {
     if std::env::var_os(ALLOW_MISSING).is_some_and(|value| value == "1") {
         Outcome::Skipped(why)

@@ -23,7 +23,6 @@ const STRUCTURE: &str = "robust.structure";
 
 impl Assumptions {
     /// Those of `model`, whose files `simulated` are marked as simulated.
-    #[must_use]
     pub fn of(model: &Model, simulated: Vec<String>) -> Self {
         let mut values = model.assumed.clone();
         // The range of structural modes is a default until the spec gives it.
@@ -40,7 +39,6 @@ impl Assumptions {
     }
 
     /// The number of values, such as `13 assumed values`; none if there are none.
-    #[must_use]
     pub fn count(&self) -> Option<String> {
         counted(&self.values, |count| format!("{count} assumed values"), "1 assumed value")
     }
@@ -55,20 +53,17 @@ impl Assumptions {
     }
 
     /// A summary such as `13 assumed values, simulated leg record`; empty if there are none.
-    #[must_use]
     pub fn summary(&self) -> String {
         self.count().into_iter().chain(self.records()).collect::<Vec<_>>().join(", ")
     }
 
     /// Each as the path of a key in the spec, or as a file.
-    #[must_use]
     pub fn list(&self) -> Vec<String> {
         let files = self.simulated.iter().map(|file| format!("hysteresis: {file} (simulated)"));
         self.values.iter().cloned().chain(files).collect()
     }
 
     /// The finding that refuses the controller of `model` for a real machine, at the list in the spec.
-    #[must_use]
     pub fn refusal(&self, model: &Model) -> Diagnostic {
         let structure = self.values.iter().any(|value| value == STRUCTURE);
         let clear = [

@@ -57,14 +57,12 @@ pub struct Compilation {
 
 impl Compilation {
     /// Emits the workspace, with the program of the spec's board if it has one: path, text. Most commands need no text.
-    #[must_use]
     pub fn files(&self) -> BTreeMap<String, String> {
         workspace::files_with(&self.ir, &emit::emit(&self.ir), &[Target::of(self.model.target.mcu).name])
     }
 
     /// Requirements that the spec does not meet although it compiles. `check` and `build` report them as errors; a
     /// simulation still runs.
-    #[must_use]
     pub fn unmet_requirements(&self) -> Vec<Diagnostic> {
         rest::check(&self.model, &self.rest_noise)
     }

@@ -35,7 +35,6 @@ pub use crate_root::calling;
 pub type EmittedCrate = BTreeMap<String, String>;
 
 /// Emits the controller crate.
-#[must_use]
 pub fn emit(ir: &Ir) -> EmittedCrate {
     let mut sources = vec![
         ("src/checked.rs", checked::emit(ir)),

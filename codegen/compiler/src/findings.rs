@@ -4,7 +4,6 @@ use crate::lint;
 use specgen_language::diagnostic::{Code, codes};
 
 /// All codes, by number.
-#[must_use]
 pub fn all() -> Vec<Code> {
     let mut all: Vec<Code> = codes::REGISTRY.iter().copied().chain(lint::codes()).collect();
     all.sort_by_key(|code| (&code.id[1..], &code.id[..1]));
@@ -12,7 +11,6 @@ pub fn all() -> Vec<Code> {
 }
 
 /// The entry of `id`.
-#[must_use]
 pub fn find(id: &str) -> Option<Code> {
     all().into_iter().find(|code| code.id == id)
 }
@@ -30,7 +28,6 @@ example is a change of a spec of the repository, or commands. A test runs it wit
 ";
 
 /// The pages of all codes as one Markdown text: the page *Findings* of the book.
-#[must_use]
 pub fn reference_markdown() -> String {
     let mut text = MARKDOWN_HEAD.to_owned();
     for code in all() {

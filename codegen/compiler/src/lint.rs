@@ -137,7 +137,6 @@ pub(crate) fn codes() -> impl Iterator<Item = Code> {
 }
 
 /// Findings about inconsistent values, in the order of the rules.
-#[must_use]
 pub fn check(model: &Model) -> Vec<Diagnostic> {
     // A singular geometry is reported elsewhere; rules that need the legs are skipped.
     let legs = crate::lower::platform(model).ok().map(|platform| Legs::of(model, &platform));

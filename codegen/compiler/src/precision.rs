@@ -54,7 +54,6 @@ impl Figures {
     }
 
     /// Bound over largest sample of each number; none if all samples are exact.
-    #[must_use]
     pub fn ratio(&self) -> [Option<f64>; 6] {
         core::array::from_fn(|k| (self.sampled[k] > 0.0).then(|| self.bound[k] / self.sampled[k]))
     }
@@ -121,7 +120,6 @@ fn boxes(bounds: &[f64; 6]) -> impl Iterator<Item = [[f64; 2]; 6]> {
 }
 
 /// Warns about rounding errors beyond the noise of the gauges: another scalar would control better.
-#[must_use]
 pub fn findings(model: &Model, precision: &Precision, noise: Option<&PoseNoise>) -> Vec<Diagnostic> {
     let (Some(noise), Some(measured)) = (noise, &precision.measured) else { return Vec::new() };
     let total = |axis: usize| measured.bound[axis] + precision.commanded.bound[axis];

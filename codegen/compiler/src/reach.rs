@@ -116,7 +116,6 @@ pub fn check_legs(
 }
 
 /// Findings about workspace bounds that no pose reaches with the declared stroke.
-#[must_use]
 pub fn check_bounds(model: &Model) -> Vec<Diagnostic> {
     let Ok(platform) = crate::lower::platform(model) else { return Vec::new() };
     let legs = travel::Legs::of(model, &platform, model.actuator.stroke);
@@ -125,13 +124,11 @@ pub fn check_bounds(model: &Model) -> Vec<Diagnostic> {
 }
 
 /// Notes for `check` about legs that reach beyond their own gauges.
-#[must_use]
 pub fn notes(model: &Model, reach: &Reach) -> Vec<Diagnostic> {
     if model.task_space.is_some() { Vec::new() } else { findings::notes_of_legs(model, reach) }
 }
 
 /// The reach with set-points about `bias` (m and rad, from rest). `stroke`: travel of every leg, m.
-#[must_use]
 pub fn measure(model: &Model, platform: &Platform<f64>, stroke: f64, bias: &Pose) -> Reach {
     let bounds = model.workspace.bounds();
     let legs = travel::Legs::of(model, platform, stroke);

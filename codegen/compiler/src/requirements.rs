@@ -18,7 +18,6 @@ pub struct Steps {
 }
 
 /// The steps of the spec's converter. The geometry must not be singular.
-#[must_use]
 pub fn steps(model: &Model) -> Steps {
     let [low, high] = model.dac.range;
     let code = (high - low) / (libm::ldexp(1.0, model.dac.bits as i32) - 1.0);

@@ -74,7 +74,6 @@ fn scaled(matrix: &Matrix6, factor: f64) -> Matrix6 {
 
 /// Findings beyond the spec's limits: the worst of x, y, z, and the worst rotation. They are errors for `check`, `build` and
 /// boards; a simulation still runs.
-#[must_use]
 pub fn check(model: &Model, noise: &RestNoise) -> Vec<Diagnostic> {
     let beyond = |axis: usize| model.requirements.noise_of(axis).map_or(0.0, |(limit, _)| noise.pose[axis] / limit);
     let worst = |axes: core::ops::Range<usize>| axes.reduce(|a, b| if beyond(b) > beyond(a) { b } else { a });

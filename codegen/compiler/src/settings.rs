@@ -5,7 +5,6 @@ use std::fmt::Write as _;
 use crate::ir::{Ir, Range, Setting};
 
 /// The document, for a platform and for six legs.
-#[must_use]
 pub fn markdown(platform: &Ir, legs: &Ir) -> String {
     let mut text = String::from(
         "# Settings\n\n\

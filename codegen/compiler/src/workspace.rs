@@ -19,13 +19,11 @@ pub use output::{write, write_scratch};
 use parts::Part;
 
 /// All files of a workspace: path relative to its root, text. The same spec gives the same bytes.
-#[must_use]
 pub fn files(ir: &Ir, controller: &EmittedCrate) -> BTreeMap<String, String> {
     files_with(ir, controller, &[])
 }
 
 /// The same with the folders of more targets (see [`parts`]), such as `stm32h743`.
-#[must_use]
 pub fn files_with(ir: &Ir, controller: &EmittedCrate, targets: &[&str]) -> BTreeMap<String, String> {
     let parts = parts::select(targets);
     let fixed = parts.iter().flat_map(|part| part.files().iter());
@@ -44,7 +42,6 @@ pub fn files_with(ir: &Ir, controller: &EmittedCrate, targets: &[&str]) -> BTree
 }
 
 /// The IR as JSON text, for people and for comparing two versions.
-#[must_use]
 pub fn ir_text(ir: &Ir) -> String {
     match serde_json::to_string_pretty(ir) {
         Ok(text) => text + "\n",

@@ -107,7 +107,6 @@ impl Cost {
     pub const EXCEPTION: u64 = 29;
 
     /// The state at reset, with empty caches. `modelled`: costs by the table, otherwise one cycle per instruction.
-    #[must_use]
     pub fn new(family: Family, modelled: bool) -> Self {
         Self {
             family,
@@ -128,7 +127,6 @@ impl Cost {
     }
 
     /// Whether costs are by the table.
-    #[must_use]
     pub const fn is_modelled(&self) -> bool {
         self.modelled
     }
@@ -281,7 +279,6 @@ impl Cost {
     }
 
     /// Largest number of words that an instruction writes to memory.
-    #[must_use]
     pub fn stored(size: u32, code: [u32; 2]) -> u64 {
         match kind(code, size) {
             Kind::Memory(words) => words,
@@ -291,7 +288,6 @@ impl Cost {
     }
 
     /// Additional cost of an access to a peripheral register.
-    #[must_use]
     pub fn access(&self, write: bool) -> u64 {
         match (self.modelled, self.family, write) {
             (false, ..) => 4,

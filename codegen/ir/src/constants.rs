@@ -190,7 +190,6 @@ pub fn permitted<T: Real>(numbers: &impl Numbers<T>, table: &ir::PermittedRanges
 }
 
 /// Largest magnitudes of the numbers of a state.
-#[must_use]
 pub fn sizes(ir: &Ir) -> Sizes {
     let s = &ir.permitted.state;
     Sizes {

@@ -13,7 +13,6 @@ const OUTPUT_NAMES: [&[&str]; 2] = [
 ];
 
 /// All lines.
-#[must_use]
 pub fn description(ir: &Ir) -> String {
     let (name, digest, version) = (&ir.name, &ir.digest, &ir.specgen_version);
     let (kind, bits) = (if ir.task_space.is_some() { "platform" } else { "legs" }, ir.scalar.bits());

@@ -37,7 +37,6 @@ pub enum Scalar {
 
 impl Scalar {
     /// Width in bits.
-    #[must_use]
     pub fn bits(self) -> u32 {
         match self {
             Self::F32 => 32,
@@ -46,7 +45,6 @@ impl Scalar {
     }
 
     /// `value` rounded to this type.
-    #[must_use]
     pub fn round(self, value: f64) -> f64 {
         match self {
             Self::F32 => f64::from(value as f32),
@@ -55,7 +53,6 @@ impl Scalar {
     }
 
     /// Distance from 1 to the next number.
-    #[must_use]
     pub fn epsilon(self) -> f64 {
         match self {
             Self::F32 => f64::from(f32::EPSILON),
@@ -185,13 +182,11 @@ pub struct DynamicsLeg {
 
 impl Dynamics {
     /// The runtime's type, in any scalar.
-    #[must_use]
     pub fn platform<T: Real>(&self) -> Platform<T> {
         self.platform_of(T::from_f64)
     }
 
     /// The runtime's type, with numbers converted by `number`.
-    #[must_use]
     pub fn platform_of<T: Real>(&self, number: impl Fn(f64) -> T) -> Platform<T> {
         let vector = |values: [f64; 3]| values.map(&number);
         Platform {
@@ -263,7 +258,6 @@ pub struct Hysteresis {
 
 impl Hysteresis {
     /// Whether the legs have plays in place of the tables.
-    #[must_use]
     pub fn has_plays(&self) -> bool {
         matches!(self.rate, Some(RateModel::BoucWen { plays: Some(_), .. }))
     }
@@ -326,7 +320,6 @@ pub struct Plays {
 
 impl Plays {
     /// Every number, in the order of the runtime's checksum.
-    #[must_use]
     pub fn numbers(&self) -> Vec<f64> {
         let after = [self.slope, self.rest, self.widening, self.per_rate, self.decay];
         [&[self.full_scale][..], &self.thresholds, &self.weights, &after].concat()
@@ -381,7 +374,6 @@ pub struct BoucWen {
 
 impl BoucWen {
     /// Every number, in the order of the runtime's checksum.
-    #[must_use]
     pub fn numbers(&self) -> Vec<f64> {
         let lists = [&self.gains, &self.weights, &self.carried].map(Vec::as_slice);
         let after = [self.slope, self.beta_plus_gamma, self.beta_minus_gamma, self.limit, self.rest];

@@ -97,7 +97,6 @@ impl PermittedRanges {
     }
 
     /// Names of the words, in order.
-    #[must_use]
     pub fn names(&self) -> Vec<String> {
         self.words().map(|(name, _)| name).collect()
     }

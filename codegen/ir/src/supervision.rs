@@ -77,7 +77,6 @@ impl Deref for Wiring {
 
 impl Supervision {
     /// Sets of faults that the wiring check cannot distinguish; empty without a check.
-    #[must_use]
     pub fn alike(&self) -> &[Vec<u32>] {
         self.wiring.as_ref().map_or(&[], |wiring| &wiring.alike)
     }

@@ -46,7 +46,6 @@ pub struct Affine {
 
 impl Affine {
     /// Terms that are not zero.
-    #[must_use]
     pub fn terms(&self) -> usize {
         self.pose.iter().chain(&self.acceleration).flatten().filter(|entry| **entry != 0.0).count()
     }
@@ -409,7 +408,6 @@ pub struct Row {
 
 impl Frames {
     /// Rounds all constants to `scalar`.
-    #[must_use]
     pub fn rounded(&self, scalar: Scalar) -> Self {
         let round = |value: f64| scalar.round(value);
         match *self {
@@ -428,7 +426,6 @@ impl Frames {
 
 impl Path {
     /// Its start in the controller, in the user's coordinates, m and rad.
-    #[must_use]
     pub fn start(&self) -> [f64; 6] {
         match self {
             Self::Segments { start, .. } => *start,
@@ -437,7 +434,6 @@ impl Path {
     }
 
     /// Ticks from start to end, or of one repetition.
-    #[must_use]
     pub fn ticks(&self) -> u32 {
         match self {
             Self::Segments { ticks, .. } => *ticks,
@@ -446,7 +442,6 @@ impl Path {
     }
 
     /// Whether it repeats.
-    #[must_use]
     pub fn repeats(&self) -> bool {
         matches!(self, Self::Table { repeat: true, .. })
     }

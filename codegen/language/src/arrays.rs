@@ -26,7 +26,6 @@ const LARGEST: usize = i32::MAX as usize;
 
 impl Form {
     /// That of a file with this suffix; none for other files.
-    #[must_use]
     pub fn of(path: &Path) -> Option<Self> {
         let suffix = path.extension()?.to_str()?;
         let is = |form: &str| suffix.eq_ignore_ascii_case(form);
@@ -109,7 +108,6 @@ impl Table {
     }
 
     /// As CSV, with the comments below the names. A name with a comma is in quotation marks.
-    #[must_use]
     pub fn csv(&self) -> String {
         let quoted = |name: &String| {
             let name = name.replace(['\n', '\r'], " ");

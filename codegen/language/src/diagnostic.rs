@@ -62,7 +62,6 @@ pub struct Diagnostic {
 
 impl Diagnostic {
     /// A finding with the severity of `code`, about `key` (empty: about no key), at `place`.
-    #[must_use]
     pub fn new(code: Code, key: &str, place: Place, message: impl Into<String>, help: impl Into<String>) -> Self {
         let (message, help) = (message.into(), help.into());
         Self { severity: code.severity(), code: code.id, key: key.to_owned(), place, message, help, replacement: None }
@@ -70,7 +69,6 @@ impl Diagnostic {
 
     /// A finding at the first of `keys` that is in the spec, by its `spans`. If none is, it is about the whole spec,
     /// with the first key.
-    #[must_use]
     pub fn at(
         spans: &BTreeMap<String, Range<usize>>,
         keys: &[&str],
@@ -85,7 +83,6 @@ impl Diagnostic {
 
     /// A finding about no key, in the data file `path` as the user named it: at `line`, counted from 1, or about the
     /// whole file.
-    #[must_use]
     pub fn in_file(
         path: &str,
         line: Option<usize>,

@@ -82,7 +82,6 @@ pub enum ReadError {
 
 impl ReadError {
     /// How to fix it.
-    #[must_use]
     pub fn help(&self) -> &'static str {
         match self {
             Self::Kind("a folder") => "name a file in it",

@@ -126,25 +126,21 @@ pub struct Range {
 
 impl Range {
     /// Both bounds allowed.
-    #[must_use]
     pub const fn closed(min: f64, max: f64) -> Self {
         Self { min, max, min_included: true, max_included: true }
     }
 
     /// Above `min`, up to `max`.
-    #[must_use]
     pub const fn above(min: f64, max: f64) -> Self {
         Self { min, max, min_included: false, max_included: true }
     }
 
     /// Neither bound allowed.
-    #[must_use]
     pub const fn open(min: f64, max: f64) -> Self {
         Self { min, max, min_included: false, max_included: false }
     }
 
     /// Whether `value` lies inside.
-    #[must_use]
     pub fn contains(&self, value: f64) -> bool {
         let above = value > self.min || (self.min_included && value >= self.min);
         let below = value < self.max || (self.max_included && value <= self.max);
@@ -171,7 +167,6 @@ pub enum Presence {
 
 impl Presence {
     /// The forms that a key belongs to; none if it is not one of several.
-    #[must_use]
     pub const fn forms(self) -> &'static [&'static str] {
         if let Self::Form(forms) = self { forms } else { &[] }
     }
@@ -180,7 +175,6 @@ impl Presence {
 impl Item {
     /// A TOML literal of its form, with a placeholder for the value and with its unit: `"<number> kg"`. A value is
     /// written out only if it is the only valid one.
-    #[must_use]
     pub fn template(self) -> String {
         match self {
             Self::Quantity { unit, .. } => format!("\"<number> {unit}\""),
@@ -196,7 +190,6 @@ impl Item {
 }
 
 /// The placeholder in a text, with its angle brackets: letters and blanks between `<` and `>`.
-#[must_use]
 pub fn placeholder(text: &str) -> Option<&str> {
     let start = text.find('<')?;
     let end = start + text[start..].find('>')?;
@@ -208,7 +201,6 @@ pub fn placeholder(text: &str) -> Option<&str> {
 impl Key {
     /// A TOML literal of its form, with a placeholder for each value: `["<number> V", "<number> V"]`. For a list, its
     /// least number of values.
-    #[must_use]
     pub fn template(&self) -> String {
         let list = |items: &[Item]| {
             let items: Vec<String> = items.iter().map(|item| item.template()).collect();
@@ -226,7 +218,6 @@ impl Key {
     }
 
     /// The item that `path` names: this key, or one value of its list ("gains.integral\[3\]").
-    #[must_use]
     pub fn item(&self, path: &str) -> Option<Item> {
         match self.shape {
             Shape::One(item) => Some(item),
@@ -240,14 +231,12 @@ impl Key {
     }
 
     /// The template of the key, or of the one item that `path` names.
-    #[must_use]
     pub fn form(&self, path: &str) -> String {
         let is_item = path.ends_with(']') || matches!(self.shape, Shape::One(_));
         self.item(path).filter(|_| is_item).map_or_else(|| self.template(), Item::template)
     }
 
     /// A line of a spec with this key: name and [`Key::template`].
-    #[must_use]
     pub fn line(&self) -> String {
         match self.shape {
             Shape::One(Item::Flag) => format!("{0} = true or {0} = false", self.name),
@@ -256,7 +245,6 @@ impl Key {
     }
 
     /// Whether `name` is its symbol or an alias, regardless of case and word separators.
-    #[must_use]
     pub fn is_called(&self, name: &str) -> bool {
         // "I_xx I_yy I_zz" are the three symbols of one list.
         self.symbol.split(' ').chain(self.aliases.iter().copied()).any(|other| is_same(other, name))
@@ -265,26 +253,22 @@ impl Key {
 
 impl Section {
     /// The same of the section.
-    #[must_use]
     pub fn is_called(&self, name: &str) -> bool {
         self.aliases.iter().any(|other| is_same(other, name))
     }
 
     /// Whether a file without this table is refused.
-    #[must_use]
     pub fn is_required(&self) -> bool {
         let needed = |key: &Key| matches!(key.presence, Presence::Required | Presence::Form(_));
         self.kind == Kind::Plain && self.keys.iter().any(needed)
     }
 
     /// Key path of one of its keys: `geometry.height`, or `name` before the first table.
-    #[must_use]
     pub fn path(&self, key: &str) -> String {
         join(self.name, key)
     }
 
     /// Its header, `[name]` or `[[name]]`; empty before the first section.
-    #[must_use]
     pub fn header(&self) -> String {
         match self.kind {
             _ if self.name.is_empty() => String::new(),
@@ -294,7 +278,6 @@ impl Section {
     }
 
     /// The forms of its keys ([`Presence::Form`]), in the order of the table.
-    #[must_use]
     pub fn forms(&self) -> Vec<&'static str> {
         let mut forms = Vec::new();
         for form in self.keys.iter().flat_map(|key| key.presence.forms()) {
@@ -306,7 +289,6 @@ impl Section {
     }
 
     /// Its header, and a line for each required key, with a placeholder for each value.
-    #[must_use]
     pub fn template(&self) -> String {
         let mut text = self.header();
         if !text.is_empty() {
@@ -332,7 +314,6 @@ fn letters(name: &str) -> impl Iterator<Item = u8> {
 }
 
 /// Key path of `key` in the table at `table`: `gauge[2].point`, or `name` before the first table.
-#[must_use]
 pub fn join(table: &str, key: &str) -> String {
     if table.is_empty() { key.to_owned() } else { format!("{table}.{key}") }
 }

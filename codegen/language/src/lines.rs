@@ -10,7 +10,6 @@ pub struct Lines<'a> {
 
 impl<'a> Lines<'a> {
     /// Of a text.
-    #[must_use]
     pub fn new(text: &'a str) -> Self {
         let breaks = text.bytes().enumerate().filter(|(_, b)| *b == b'\n').map(|(i, _)| i + 1);
         Self { text, starts: std::iter::once(0).chain(breaks).collect() }

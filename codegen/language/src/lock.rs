@@ -48,14 +48,12 @@ pub fn sweep(folder: &Path, prefix: &str) {
 
 /// Whether it belongs to this user.
 #[cfg(unix)]
-#[must_use]
 pub fn is_own(found: &fs::Metadata) -> bool {
     std::os::unix::fs::MetadataExt::uid(found) == rustix::process::geteuid().as_raw()
 }
 
 /// Whether it belongs to this user; decided by permissions if users have no numbers.
 #[cfg(not(unix))]
-#[must_use]
 pub fn is_own(_: &fs::Metadata) -> bool {
     true
 }

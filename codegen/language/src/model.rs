@@ -196,14 +196,12 @@ impl Model {
     }
 
     /// Voltage of the legs while disarmed, V; within the limits of a spec that compiles.
-    #[must_use]
     pub fn rest_voltage(&self) -> f64 {
         let [low, high] = self.actuator.voltage;
         self.supervisor.rest_voltage.unwrap_or_else(|| Self::nearest_to_zero(low, high))
     }
 
     /// The voltage from `low` to `high` (V) nearest to that of a stack whose amplifier is off.
-    #[must_use]
     pub fn nearest_to_zero(low: f64, high: f64) -> f64 {
         if low > 0.0 {
             low

@@ -103,14 +103,12 @@ pub enum Failure {
 
 impl Failure {
     /// Ended by Ctrl-C before there was a result.
-    #[must_use]
     pub fn interrupted() -> Self {
         let message = "interrupted: there is no result and no partial file".to_owned();
         Self::Interrupted { message, result: Value::Null }
     }
 
     /// The exit code of the process.
-    #[must_use]
     pub fn exit_code(&self) -> u8 {
         match self {
             Self::Refused(_) | Self::Gate(_) | Self::Judged { .. } => 1,
@@ -122,7 +120,6 @@ impl Failure {
     }
 
     /// The reason, as the last line of the command.
-    #[must_use]
     pub fn message(&self) -> String {
         match self {
             Self::Refused(refused) => format!("{} is refused; nothing was written", refused.file()),
@@ -138,7 +135,6 @@ impl Failure {
     }
 
     /// The part of the result that there is; null if there is none.
-    #[must_use]
     pub fn result(&self) -> Value {
         match self {
             Self::Interrupted { result, .. }

@@ -180,7 +180,6 @@ pub fn parse_as(text: &str, dimension: Dimension) -> Result<Quantity, QuantityEr
 }
 
 /// The meanings of a quantity that have `dimension`, in symbols and with their values; none if it is not a quantity.
-#[must_use]
 pub fn readings(text: &str, dimension: Dimension) -> Vec<(String, f64)> {
     let fitting = meanings(text).unwrap_or_default().into_iter().filter(|one| one.scale.dimension == dimension);
     fitting.filter_map(|one| Some((one.text.trim().to_owned(), one.quantity().ok()?.value))).collect()
@@ -244,7 +243,6 @@ fn only(text: &str, found: Vec<&Meaning>) -> Result<Quantity, QuantityError> {
 }
 
 /// SI value of one `unit` such as "mm" or "N m/rad"; `None` if it is not a unit.
-#[must_use]
 pub fn unit_value(unit: &str) -> Option<Quantity> {
     parse(&format!("1 {unit}")).ok()
 }

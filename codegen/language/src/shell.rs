@@ -15,7 +15,6 @@ use std::path::Path;
 pub struct Line(String);
 
 /// Begins a line with words that need no quotes, such as a command and its options.
-#[must_use]
 pub fn line(words: &str) -> Line {
     Line(words.to_owned())
 }
@@ -41,7 +40,6 @@ impl Line {
 
     /// The line with its output redirected to a new file beside `input`: of the same name, but with `ending`, and a
     /// number if that exists. Also returns the name of the new file.
-    #[must_use]
     pub fn into_new(self, input: &str, ending: &str) -> (Self, String) {
         let new = free(input, ending);
         (self.words(">").path(&new), new)
@@ -61,34 +59,29 @@ impl From<Line> for String {
 }
 
 /// A command on a file, and its options.
-#[must_use]
 pub fn on(command: &str, path: impl AsRef<Path>, options: &str) -> String {
     line(command).path(path).words(options).into()
 }
 
 /// The same file under a name that no program takes for an option.
-#[must_use]
 pub fn no_option(path: String) -> String {
     if path.starts_with('-') { format!("./{path}") } else { path }
 }
 
 /// Help text: the line by which `command` makes a new file from `input`, and the request to name the new file instead.
 /// `command` reads standard input if it ends in `<`.
-#[must_use]
 pub fn converted(command: &str, input: &str, ending: &str) -> String {
     let (line, new) = line(command).path(input).into_new(input, ending);
     format!("`{line}`, then name {new}")
 }
 
 /// The same for a text in another encoding, as `iconv` calls it.
-#[must_use]
 pub fn as_utf8(encoding: &str, input: &str) -> String {
     let ending = Path::new(input).extension().map_or_else(String::new, |end| format!(".{}", end.display()));
     converted(&format!("iconv -f {encoding} -t UTF-8"), input, &format!(".utf8{ending}"))
 }
 
 /// Quoted as one word of a shell.
-#[must_use]
 pub fn quoted(text: &str) -> String {
     let plain = |c: char| c.is_ascii_alphanumeric() || "-_./+=:%,@".contains(c);
     if !text.is_empty() && text.chars().all(plain) {
@@ -99,7 +92,6 @@ pub fn quoted(text: &str) -> String {
 }
 
 /// A free name beside `path`: `path` without its extension, and `ending`, with a number if needed.
-#[must_use]
 pub fn free(path: &str, ending: &str) -> String {
     let folder = path.rfind('/').map_or(0, |slash| slash + 1);
     let dot = path[folder..].rfind('.').filter(|dot| *dot > 0);

@@ -64,13 +64,11 @@ macro_rules! say {
 
 impl Ui {
     /// Text, or one JSON document at the end.
-    #[must_use]
     pub fn new(json: bool) -> Self {
         Self { json, controller: Cell::new(None), findings: Vec::new(), lost: RefCell::new(None), caller: None }
     }
 
     /// One document, which [`Ui::into_document`] returns; `listener` gets the progress. Nothing is printed.
-    #[must_use]
     pub fn called(listener: impl Fn(Message<'_>) + 'static, lines: Option<Receiver<String>>) -> Self {
         let document = RefCell::new(Value::Null);
         Self { caller: Some(Caller { listener: Box::new(listener), lines, document }), ..Self::new(true) }
@@ -90,7 +88,6 @@ impl Ui {
     }
 
     /// The document of a command that another program called.
-    #[must_use]
     pub fn into_document(self) -> Value {
         self.caller.map_or(Value::Null, |caller| caller.document.into_inner())
     }
@@ -227,13 +224,11 @@ impl Ui {
     }
 
     /// Whether standard error is a terminal, or a program takes every line that would be shown at one.
-    #[must_use]
     pub fn is_terminal(&self) -> bool {
         self.caller.is_some() || io::stderr().is_terminal()
     }
 
     /// Whether the result is for programs.
-    #[must_use]
     pub fn is_json(&self) -> bool {
         self.json
     }
@@ -259,7 +254,6 @@ impl Ui {
     }
 
     /// Says so and gives the exit code if standard output did not take all that was written to it.
-    #[must_use]
     pub fn not_all_out(&self) -> Option<u8> {
         let error = self.lost.take()?;
         say!("error: could not write to standard output: {error}; the output is incomplete\n");

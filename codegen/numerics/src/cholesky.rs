@@ -27,14 +27,12 @@ pub struct Factor {
 
 impl Factor {
     /// An empty factor with room for `most` rows.
-    #[must_use]
     pub fn new(most: usize) -> Self {
         let threads = std::thread::available_parallelism().map_or(1, |count| count.get().min(THREADS));
         Self { rows: vec![0.0; most * most], stride: most, size: 0, threads }
     }
 
     /// The factor of a matrix given by its lower triangle; `None` if it is not positive definite.
-    #[must_use]
     pub fn of(size: usize, entry: impl Fn(usize, usize) -> f64) -> Option<Self> {
         let mut factor = Self::new(size);
         factor.set(0, size, entry).then_some(factor)

@@ -37,7 +37,6 @@ pub struct Cma {
 
 impl Cma {
     /// Starts at `start` (numbers in [0, 1]) with `population` candidates a generation, at least 4.
-    #[must_use]
     pub fn new(start: &[f64], population: usize, seed: u64) -> Self {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         rng.set_stream(STREAM);
@@ -114,7 +113,6 @@ pub fn unit_interval(rng: &mut ChaCha8Rng) -> f64 {
 }
 
 /// Indices in ascending order of cost, rejected ones last; ties keep the order of the list.
-#[must_use]
 pub fn ranked(costs: &[Option<f64>]) -> Vec<usize> {
     let mut order: Vec<usize> = (0..costs.len()).collect();
     let key = |index: &usize| costs[*index].unwrap_or(f64::INFINITY);

@@ -10,7 +10,6 @@ const SQUARINGS: i32 = 5;
 pub type Matrix6c = [[Complex; 6]; 6];
 
 /// I − share · product.
-#[must_use]
 pub fn left(product: &Matrix6c, share: f64) -> Matrix6c {
     std::array::from_fn(|i| {
         std::array::from_fn(|j| [f64::from(i == j) - share * product[i][j][0], -share * product[i][j][1]])
@@ -18,19 +17,16 @@ pub fn left(product: &Matrix6c, share: f64) -> Matrix6c {
 }
 
 /// matrix · vector.
-#[must_use]
 pub fn mapped(matrix: &Matrix6, vector: &[f64; 6]) -> [f64; 6] {
     matrix.map(|row| row.iter().zip(vector).map(|(factor, value)| factor * value).sum())
 }
 
 /// a b.
-#[must_use]
 pub fn multiply(a: &Matrix6c, b: &Matrix6c) -> Matrix6c {
     std::array::from_fn(|i| std::array::from_fn(|j| (0..6).fold([0.0; 2], |sum, k| plus(sum, times(a[i][k], b[k][j])))))
 }
 
 /// A close upper bound of the spectral radius: ‖M^n‖^(1/n).
-#[must_use]
 pub fn spectral_radius(matrix: &Matrix6c) -> f64 {
     let mut power = *matrix;
     let mut scale = 0.0;
@@ -48,20 +44,17 @@ pub fn spectral_radius(matrix: &Matrix6c) -> f64 {
 }
 
 /// Largest row sum of magnitudes.
-#[must_use]
 pub fn norm(matrix: &Matrix6c) -> f64 {
     let sums = matrix.iter().map(|row| row.iter().map(|value| libm::sqrt(square(*value))).sum::<f64>());
     sums.fold(0.0, larger)
 }
 
 /// The larger of two; NaN if either is.
-#[must_use]
 pub fn larger(a: f64, b: f64) -> f64 {
     if a.is_nan() || b <= a { a } else { b }
 }
 
 /// The inverse by elimination with row pivots; not finite for a singular matrix.
-#[must_use]
 pub fn inverse(matrix: &Matrix6c) -> Matrix6c {
     let mut a = *matrix;
     let mut b: Matrix6c = std::array::from_fn(|i| std::array::from_fn(|j| [f64::from(i == j), 0.0]));
@@ -82,7 +75,6 @@ pub fn inverse(matrix: &Matrix6c) -> Matrix6c {
 }
 
 /// a + factor · b.
-#[must_use]
 pub fn sum(a: &Matrix6c, b: &Matrix6c, factor: f64) -> Matrix6c {
     std::array::from_fn(|i| std::array::from_fn(|j| plus(a[i][j], b[i][j].map(|part| factor * part))))
 }
@@ -98,7 +90,6 @@ pub fn add_product(to: &mut Matrix6c, factor: Complex, column: &[Complex; 6], ro
 }
 
 /// The numbers of a matrix by row, Re before Im, each times the weight of its entry.
-#[must_use]
 pub fn weighted(weights: &[[f64; 6]; 6], matrix: &Matrix6c) -> [f64; 72] {
     std::array::from_fn(|k| {
         let (i, j) = (k / 12, k / 2 % 6);
@@ -108,7 +99,6 @@ pub fn weighted(weights: &[[f64; 6]; 6], matrix: &Matrix6c) -> [f64; 72] {
 
 /// Scalar product, in eight sums, which the compiler turns into vector instructions here.
 #[inline(never)]
-#[must_use]
 pub fn dot(a: &[f64; 72], b: &[f64; 72]) -> f64 {
     let mut sums = [0.0; 8];
     for (a, b) in a.chunks_exact(8).zip(b.chunks_exact(8)) {

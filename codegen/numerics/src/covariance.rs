@@ -9,7 +9,6 @@ const SMALL: f64 = 1e-14;
 
 /// P = A P Aᵀ + B Bᵀ, the steady-state covariance of x⁺ = A x + B w for each of several inputs B, where w is white with
 /// unit variance. `inputs` holds one B each, a row per state. Infinite if the system is not stable.
-#[must_use]
 pub fn steady_covariances<const N: usize>(transition: &Matrix, inputs: [&[Vec<f64>]; N]) -> [Matrix; N] {
     let mut sums = inputs.map(of_input);
     let mut power = transition.clone();

@@ -44,7 +44,6 @@ fn two_product(a: f64, b: f64) -> Double {
 
 impl Double {
     /// The double nearest to it.
-    #[must_use]
     pub fn value(self) -> f64 {
         self.high + self.low
     }

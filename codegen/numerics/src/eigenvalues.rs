@@ -8,7 +8,6 @@ const STEPS: u32 = 60;
 
 /// All eigenvalues as (real, imaginary), in the order they were deflated; none if an entry is not finite or the iteration
 /// does not converge.
-#[must_use]
 pub fn eigenvalues(matrix: &Matrix) -> Option<Vec<(f64, f64)>> {
     let mut found = Vec::with_capacity(matrix.size());
     for block in matrix.blocks() {
@@ -67,7 +66,6 @@ fn balance(a: &mut Matrix) {
 }
 
 /// Largest magnitude of an eigenvalue; infinite if they cannot be computed, NaN if one of them is NaN.
-#[must_use]
 pub fn spectral_radius(matrix: &Matrix) -> f64 {
     let Some(values) = eigenvalues(matrix) else {
         return f64::INFINITY;

@@ -8,7 +8,6 @@ const TERMS: u32 = 19;
 const LARGEST_EXPONENT: u32 = 60;
 
 /// e^A. Entries are finite for any A whose norm is below 2⁶⁰ and whose exponential is finite.
-#[must_use]
 pub fn exponential(matrix: &Matrix) -> Matrix {
     let mut squarings = 0;
     let mut norm = matrix.row_norm();

@@ -13,13 +13,11 @@ use rustfft::algorithm::butterflies::Butterfly8;
 use rustfft::algorithm::{BluesteinsAlgorithm, Radix4};
 
 /// Σ x_n e^(−i 2π k n/N) for N = `length`, at least 1, in place. A power of two takes a quarter of the time of other lengths.
-#[must_use]
 pub fn forward(length: usize) -> Arc<dyn Fft<f64>> {
     transform(length, FftDirection::Forward)
 }
 
 /// Σ x_n e^(+i 2π k n/N) for N = `length`, at least 1, in place: without the factor 1/N.
-#[must_use]
 pub fn inverse(length: usize) -> Arc<dyn Fft<f64>> {
     transform(length, FftDirection::Inverse)
 }

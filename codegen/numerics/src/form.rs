@@ -40,7 +40,6 @@ pub(crate) fn apart(a: [f64; 2], b: [f64; 2]) -> Option<Ordering> {
 }
 
 /// Largest magnitude of an interval.
-#[must_use]
 pub fn magnitude([low, high]: [f64; 2]) -> f64 {
     let (a, b) = (low.abs(), high.abs());
     if a > b { a } else { b }

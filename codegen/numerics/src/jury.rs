@@ -1,13 +1,11 @@
 //! Jury tests of Appendix B for a leg without dynamics.
 
 /// λ below which EWMA is stable, from the pole 1 − λω of (AII.15): 2/ω. (AII.18) prints 2, which is its ω = 1 case.
-#[must_use]
 pub fn ewma_limit(weight: f64) -> f64 {
     2.0 / weight
 }
 
 /// λ below which PCC is stable, from the poles of (AII.17): 4/(2ω_Σ − ω_Π), the third inequality of (AII.19); the others never bind for weights in (0, 1].
-#[must_use]
 pub fn pcc_limit(level_weight: f64, drift_weight: f64) -> f64 {
     4.0 / (2.0 * (level_weight + drift_weight) - level_weight * drift_weight)
 }

@@ -8,7 +8,6 @@ use crate::nyquist::Flexure;
 pub type ComplexMatrix = Matrix6<Complex<f64>>;
 
 /// a b. It is here, and not in the compiler, because this crate is optimised for speed.
-#[must_use]
 pub fn product(a: &ComplexMatrix, b: &ComplexMatrix) -> ComplexMatrix {
     a * b
 }
@@ -38,14 +37,12 @@ impl Loci {
     }
 
     /// Of the modes from one frequency to another (Hz), the one that needs the most damping: its frequency, Hz, and ζ.
-    #[must_use]
     pub fn demanded(&self, flexure: Flexure, [from, to]: [f64; 2]) -> [f64; 2] {
         let inside = self.demands(flexure).filter(|[frequency, _]| (from..=to).contains(frequency));
         inside.fold([from, 0.0], |most, one| if one[1] > most[1] { one } else { most })
     }
 
     /// The most damping that a mode needs from each of `frequencies` (Hz, ascending) to the next; zero where every damping is enough.
-    #[must_use]
     pub fn border(&self, flexure: Flexure, frequencies: &[f64]) -> Vec<f64> {
         let mut border = vec![0.0; frequencies.len()];
         for [frequency, damping] in self.demands(flexure) {
@@ -61,7 +58,6 @@ impl Loci {
 }
 
 /// Eigenvalues of a matrix. Modes that are not coupled keep their own.
-#[must_use]
 pub fn complex_eigenvalues(matrix: &ComplexMatrix) -> [Complex<f64>; 6] {
     let mut found = [Complex::new(0.0, 0.0); 6];
     let mut done = [false; 6];

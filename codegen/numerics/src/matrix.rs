@@ -6,7 +6,6 @@ use core::ops::{Index, IndexMut};
 pub type Matrix6 = [[f64; 6]; 6];
 
 /// The product A B.
-#[must_use]
 pub fn multiply6(a: &Matrix6, b: &Matrix6) -> Matrix6 {
     let mut product = [[0.0; 6]; 6];
     for (row, out) in a.iter().zip(&mut product) {
@@ -20,7 +19,6 @@ pub fn multiply6(a: &Matrix6, b: &Matrix6) -> Matrix6 {
 }
 
 /// The transposed matrix Aᵀ.
-#[must_use]
 pub fn transpose6(a: &Matrix6) -> Matrix6 {
     core::array::from_fn(|i| core::array::from_fn(|j| a[j][i]))
 }
@@ -34,13 +32,11 @@ pub struct Matrix {
 
 impl Matrix {
     /// A matrix of `size` rows whose entries are zero.
-    #[must_use]
     pub fn zeros(size: usize) -> Self {
         Self { size, entries: vec![0.0; size * size] }
     }
 
     /// The identity of `size` rows.
-    #[must_use]
     pub fn identity(size: usize) -> Self {
         let mut matrix = Self::zeros(size);
         for i in 0..size {
@@ -50,13 +46,11 @@ impl Matrix {
     }
 
     /// Number of rows, and of columns.
-    #[must_use]
     pub fn size(&self) -> usize {
         self.size
     }
 
     /// The entries of one row; rows count from 0.
-    #[must_use]
     pub fn row(&self, row: usize) -> &[f64] {
         &self.entries[row * self.size..(row + 1) * self.size]
     }
@@ -73,7 +67,6 @@ impl Matrix {
     }
 
     /// Aᵀ.
-    #[must_use]
     pub fn transposed(&self) -> Self {
         let mut transposed = Self::zeros(self.size);
         for row in 0..self.size {
@@ -85,7 +78,6 @@ impl Matrix {
     }
 
     /// A B. Products with a zero entry are left out, so that blocks that do not couple stay exactly separate.
-    #[must_use]
     pub fn times(&self, other: &Self) -> Self {
         let mut product = Self::zeros(self.size);
         for i in 0..self.size {
@@ -111,7 +103,6 @@ impl Matrix {
     }
 
     /// Largest sum of magnitudes in a row.
-    #[must_use]
     pub fn row_norm(&self) -> f64 {
         let mut largest = 0.0;
         for i in 0..self.size {
@@ -127,7 +118,6 @@ impl Matrix {
     }
 
     /// Index sets that do not couple, each in rising order: the matrix is block diagonal over them.
-    #[must_use]
     pub fn blocks(&self) -> Vec<Vec<usize>> {
         let mut block_of: Vec<Option<usize>> = vec![None; self.size];
         let mut blocks: Vec<Vec<usize>> = Vec::new();
@@ -156,7 +146,6 @@ impl Matrix {
     }
 
     /// Rows and columns of `members`.
-    #[must_use]
     pub fn restricted(&self, members: &[usize]) -> Self {
         let mut part = Self::zeros(members.len());
         for (i, &row) in members.iter().enumerate() {

@@ -195,7 +195,6 @@ impl<'a> Problem<'a> {
 
 /// Largest violation of the Karush–Kuhn–Tucker conditions on the problem scaled to unit diagonal, relative to the
 /// largest entry of its right-hand side: w ≥ 0, gradient ≥ 0 where w = 0, gradient = 0 where w > 0.
-#[must_use]
 pub fn kkt_violation(gram: &DMatrix<f64>, rhs: &[f64], weights: &[f64]) -> f64 {
     let Ok(problem) = Problem::new(gram, rhs) else { return f64::INFINITY };
     let scaled: Vec<f64> = weights.iter().zip(&problem.scale).map(|(w, s)| w / s).collect();

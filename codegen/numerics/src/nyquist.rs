@@ -5,14 +5,12 @@ pub type Complex = [f64; 2];
 
 /// a b.
 #[inline]
-#[must_use]
 pub fn times(a: Complex, b: Complex) -> Complex {
     [a[0] * b[0] - a[1] * b[1], a[0] * b[1] + a[1] * b[0]]
 }
 
 /// a + b.
 #[inline]
-#[must_use]
 pub fn plus(a: Complex, b: Complex) -> Complex {
     [a[0] + b[0], a[1] + b[1]]
 }
@@ -27,7 +25,6 @@ pub fn over(a: Complex, b: Complex) -> Complex {
 
 /// |a|².
 #[inline]
-#[must_use]
 pub fn square(a: Complex) -> f64 {
     a[0] * a[0] + a[1] * a[1]
 }
@@ -76,7 +73,6 @@ pub enum Flexure {
 impl Flexure {
     /// The factor at `ratio` r.
     #[inline]
-    #[must_use]
     pub fn factor(self, ratio: f64, damping_ratio: f64) -> Complex {
         let below = [1.0 - ratio * ratio, 2.0 * damping_ratio * ratio];
         match self {
@@ -93,7 +89,6 @@ impl Flexure {
     /// sensor   T' = L/(1 + L − δ)   f_n = f √(1 − a Re T')     ζ = −a Im T'/(2 √(1 − a Re T'))
     /// ```
     #[inline]
-    #[must_use]
     pub fn border(self, loop_gain: Complex, distance: Complex) -> Option<[f64; 2]> {
         let (square, imaginary) = match self {
             Self::Series => {
@@ -117,7 +112,6 @@ impl Flexure {
     /// Whether [`Flexure::border`] may give f_n/f above `least[0]` and ζ above `least[1]`, both from 0 on: false only where it certainly
     /// does not. It needs no division and no root.
     #[inline]
-    #[must_use]
     pub fn may_exceed(self, loop_gain: Complex, distance: Complex, least: [f64; 2]) -> bool {
         // The numbers of `border` times the denominator d = |…|²: d·square and d·imaginary.
         let (below, share) = match self {
@@ -142,7 +136,6 @@ impl Flexure {
     /// Whether [`Flexure::may_exceed`] may hold for any δ with |δ| = `distance` < 1: L' and T' are then on a circle. False only where it
     /// certainly holds for none of them.
     #[inline]
-    #[must_use]
     pub fn may_exceed_about(self, loop_gain: Complex, distance: f64, least: [f64; 2]) -> bool {
         // −L' or a T' on the circle.
         let (from_one, norm, share) = match self {
@@ -194,7 +187,6 @@ impl FlexureRange {
     const STEEP: f64 = 40.0;
 
     /// The range of modes with which |1 + L·factor| must be at least `distance` everywhere.
-    #[must_use]
     pub fn new(from: f64, damping_ratio: f64, flexures: Vec<Flexure>, distance: f64) -> Self {
         let point = |k: u32| {
             let (sin, cos) = libm::sincos(core::f64::consts::TAU * f64::from(k) / f64::from(Self::POINTS));
@@ -256,7 +248,6 @@ pub struct Tolerance {
 
 /// Stability and largest |S| of a loop, as in [`sensitivity`], and the largest depth of its border over `frequencies`; `gain` is
 /// `controller` over `cancelled`.
-#[must_use]
 pub fn tolerance(
     plant: &[Complex],
     controller: &[Complex],

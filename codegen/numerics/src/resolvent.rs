@@ -18,7 +18,6 @@ pub struct Resolvent {
 
 impl Resolvent {
     /// `input` has a row for each of the states.
-    #[must_use]
     pub fn new(transition: &Matrix, input: &[[f64; 6]]) -> Self {
         let mut hessenberg = transition.clone();
         let steps = reduce(&mut hessenberg);

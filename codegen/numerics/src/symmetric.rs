@@ -13,7 +13,6 @@ const EQUAL: f64 = 1e-9;
 const TIE: f64 = 1e-6;
 
 /// Eigenvalues (unordered) and eigenvectors (columns) of a symmetric matrix. Only its upper triangle is used.
-#[must_use]
 pub fn symmetric_eigen(matrix: &Matrix6) -> ([f64; 6], Matrix6) {
     let mut a = *matrix;
     let mut vectors: Matrix6 = core::array::from_fn(|i| core::array::from_fn(|j| if i == j { 1.0 } else { 0.0 }));
@@ -136,7 +135,6 @@ fn solve_upper(l: &Matrix6, b: &Matrix6) -> Matrix6 {
 ///
 /// V is unique. The vector of a single ω² has a positive M-share of the axis with its largest share. The vectors of
 /// equal ω² are projections of axes onto their common space, the axis with the largest share first.
-#[must_use]
 pub fn generalized_modes(stiffness: &Matrix6, mass: &Matrix6) -> Option<([f64; 6], Matrix6)> {
     let l = cholesky(mass)?;
     // L⁻¹ K L⁻ᵀ: K is symmetric, so the second solve works on the transpose of the first.
@@ -225,7 +223,6 @@ fn add(sum: &mut [f64; 6], factor: f64, v: &[f64; 6]) {
 }
 
 /// Used by tests and by callers that need V⁻¹: it is Vᵀ M.
-#[must_use]
 pub fn inverse_of_modes(modes: &Matrix6, mass: &Matrix6) -> Matrix6 {
     multiply6(&transpose6(modes), mass)
 }

@@ -48,13 +48,11 @@ impl Expansion {
     }
 
     /// g: first derivatives by the variables, each over its half width.
-    #[must_use]
     pub const fn slope(&self) -> &[f64; COUNT] {
         &self.slope
     }
 
     /// |f(ξ) − f(0) − Σ `slope`·ξ| is nowhere larger.
-    #[must_use]
     pub fn left_by(&self, slope: &[f64; COUNT]) -> f64 {
         let mut total = self.rest;
         for (own, kept) in self.slope.iter().zip(slope) {

@@ -20,6 +20,7 @@ use super::margins::adapting_name;
 use super::section::{Grid, Part, Rows, Section};
 use super::spectrum::cumulative;
 use super::tracking::{AXES, LEGS, TrackedPath, mode_of};
+use super::verdict::capital;
 use specgen_language::model::{Model, TaskSpace};
 use specgen_studies::machine;
 use specgen_studies::reproduce;
@@ -296,11 +297,6 @@ fn squared(end: f64) -> Vec<f64> {
     let step =
         [0.2, 0.25, 0.5, 1.0, 2.0].iter().map(|k| k * decade).find(|step| end / step <= 5.0).unwrap_or(2.0 * decade);
     (0..=5).map(|k| f64::from(k) * step).filter(|v| *v <= end).collect()
-}
-
-fn capital(text: &str) -> String {
-    let mut letters = text.chars();
-    letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
 }
 
 #[cfg(test)]

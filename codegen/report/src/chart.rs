@@ -107,7 +107,7 @@ pub struct Patch {
 }
 
 /// An axis.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct Axis {
     /// The quantity.
     pub label: String,
@@ -119,19 +119,16 @@ pub struct Axis {
 
 impl Axis {
     /// A linear axis.
-    #[must_use]
     pub fn linear(label: &str, unit: &str) -> Self {
         Self { label: label.to_owned(), unit: unit.to_owned(), log: false }
     }
 
     /// A logarithmic axis.
-    #[must_use]
     pub fn log(label: &str, unit: &str) -> Self {
         Self { log: true, ..Self::linear(label, unit) }
     }
 
     /// Label and unit as one text.
-    #[must_use]
     pub fn text(&self) -> String {
         if self.unit.is_empty() { self.label.clone() } else { format!("{} ({})", self.label, self.unit) }
     }
@@ -157,7 +154,8 @@ fn short(value: f64) -> f64 {
 }
 
 /// A chart: one pair of axes and its content.
-#[derive(Debug, Clone, PartialEq)]
+#[must_use]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct Chart {
     /// For file names and page links; empty in a picture.
     pub id: String,
@@ -189,34 +187,17 @@ pub struct Chart {
 
 impl Chart {
     /// An empty chart.
-    #[must_use]
     pub fn new(id: &str, title: &str, x: Axis, y: Axis) -> Self {
-        Self {
-            id: id.to_owned(),
-            title: title.to_owned(),
-            short: String::new(),
-            x,
-            y,
-            series: Vec::new(),
-            patches: Vec::new(),
-            hatched: None,
-            y_limits: None,
-            notes: Vec::new(),
-            keys: false,
-            bare: false,
-            height: 0,
-        }
+        Self { id: id.to_owned(), title: title.to_owned(), x, y, ..Self::default() }
     }
 
     /// Adds a series in the next colour.
-    #[must_use]
     pub fn with(mut self, name: &str, mark: Mark, points: Vec<[f64; 2]>) -> Self {
         self.series.push(Series { name: name.to_owned(), mark, color: self.series.len(), points, even: None });
         self
     }
 
     /// Sets the colour of the last series; several may share one.
-    #[must_use]
     pub fn colored(mut self, color: usize) -> Self {
         if let Some(last) = self.series.last_mut() {
             last.color = color;
@@ -225,7 +206,6 @@ impl Chart {
     }
 
     /// Adds an annotation.
-    #[must_use]
     pub fn noted(mut self, note: Note) -> Self {
         self.notes.push(note);
         self
@@ -233,7 +213,6 @@ impl Chart {
 
     /// Adds `values` at regular times: the first at `start`, `step` apart (s). Long series are thinned to the minimum and maximum
     /// of each stretch, so no peak is lost.
-    #[must_use]
     pub fn over_time(self, name: &str, mark: Mark, [start, step]: [f64; 2], values: &[f64]) -> Self {
         let (every, thin) = thinned(values);
         let points = thin.iter().enumerate().map(|(k, value)| [start + k as f64 * step * every, *value]).collect();
@@ -245,7 +224,6 @@ impl Chart {
     }
 
     /// Adds a line in stretches, each with its start time and values `step` apart (s).
-    #[must_use]
     pub fn in_stretches(self, name: &str, mark: Mark, step: f64, stretches: Vec<(f64, Vec<f64>)>) -> Self {
         if let [(start, values)] = &stretches[..] {
             return self.over_time(name, mark, [*start, step], values);
@@ -262,7 +240,6 @@ impl Chart {
     }
 
     /// Data for a page's script.
-    #[must_use]
     pub fn data(&self) -> Value {
         let series = |one: &Series| {
             let of = |which: usize| one.points.iter().map(|point| point[which]).collect::<Vec<_>>();
@@ -287,7 +264,6 @@ impl Chart {
     }
 
     /// Table of its series: first and last value, minimum, maximum, rms.
-    #[must_use]
     pub fn numbers(&self) -> Grid {
         let head = ["series", "points", "from", "to", "lowest", "at", "highest", "at", "rms"];
         let mut grid = Grid::new(&format!("{} ({} over {})", self.title, self.y.text(), self.x.text()), &head);
@@ -309,7 +285,6 @@ impl Chart {
 }
 
 /// Points from two lists.
-#[must_use]
 pub fn pairs(x: &[f64], y: &[f64]) -> Vec<[f64; 2]> {
     x.iter().zip(y).map(|(x, y)| [*x, *y]).collect()
 }

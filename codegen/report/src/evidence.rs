@@ -14,7 +14,6 @@ use specgen_studies::verdict::{Mark, Subject, Verdict};
 use specgen_studies::verify::Measurement;
 
 /// The findings and their places, as reported by `specgen check`.
-#[must_use]
 pub fn findings(compiled: &Compilation, command: &str) -> Section {
     let section = Section::new("findings", "Findings", command);
     if compiled.findings.is_empty() {
@@ -33,7 +32,6 @@ pub fn findings(compiled: &Compilation, command: &str) -> Section {
 }
 
 /// Errors on trajectories and their limits.
-#[must_use]
 pub fn tracking(verdict: &Verdict, command: &str) -> Section {
     let mut table = Grid::new("Errors on trajectories, rms", &["error", "value", "limit", "unit", ""]);
     for figure in verdict.figures.iter().filter(|figure| figure.subject == Subject::Tracking) {
@@ -49,7 +47,6 @@ pub fn tracking(verdict: &Verdict, command: &str) -> Section {
 }
 
 /// Table of every control mode that can be selected at run time.
-#[must_use]
 pub fn control_modes(design: &Design) -> Grid {
     let or = |value: Option<f64>, none: &str| value.map_or_else(|| none.to_owned(), digits);
     let mut table = Grid::new(
@@ -82,7 +79,6 @@ pub fn control_modes(design: &Design) -> Grid {
 }
 
 /// Modes of the platform on its legs.
-#[must_use]
 pub fn modes(design: &Design) -> Grid {
     let mut modes = Grid::new("Modes of the platform on its legs", &["mode", "Hz", "ζ"]);
     for (number, mode) in design.modes.iter().enumerate() {
@@ -93,7 +89,6 @@ pub fn modes(design: &Design) -> Grid {
 }
 
 /// Effect of active damping on each mode; `None` without it.
-#[must_use]
 pub fn damping(design: &Design) -> Option<Grid> {
     let damping = design.damping.as_ref()?;
     let at = SLOW.map(|part| format!("|S| at {} Hz", digits(design.modes[0].frequency / TAU / part)));
@@ -116,7 +111,6 @@ pub fn damping(design: &Design) -> Option<Grid> {
 }
 
 /// Rounding errors of the scalar, per axis.
-#[must_use]
 pub fn rounding(rounding: &Precision, scalar: Scalar, command: &str) -> Section {
     let single = rounding.commanded.against_f64.is_some();
     let mut head = vec!["pose", "axis", "unit", "analytical bound", "largest found", "bound / found"];
@@ -135,7 +129,6 @@ pub fn rounding(rounding: &Precision, scalar: Scalar, command: &str) -> Section 
 }
 
 /// Time and memory on the emulated machine, or why they were not measured.
-#[must_use]
 pub fn budget(target: &Target, measured: Result<&Measurement, &str>, command: &str) -> Section {
     let budget = &target.budget;
     let section = Section::new("budget", "Time and memory", command);
@@ -200,7 +193,6 @@ pub struct Bits<'a> {
 }
 
 /// Digests of spec, controller and the compared runs.
-#[must_use]
 pub fn digests(compiled: &Compilation, bits: &Bits, command: &str) -> Section {
     let mut table = Grid::new("Digests", &["what", "value"]);
     let mut row = |what: &str, value: String| table.push(vec![what.to_owned(), value]);

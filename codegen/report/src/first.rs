@@ -1,7 +1,5 @@
 //! First screen of a page: verdict, key figures, platform, findings; for a refused spec its source.
 
-use std::fmt::Write as _;
-
 use serde_json::json;
 use specgen_compiler::compile::Compilation;
 use specgen_compiler::lower;
@@ -40,7 +38,6 @@ pub struct Errors {
 }
 
 /// The first screen of a compiled spec. `mode`: its control mode, as the value of the word `mode`.
-#[must_use]
 pub fn of(
     compiled: &Compilation,
     verdict: &Verdict,
@@ -106,7 +103,7 @@ fn error_card(verdict: &Verdict, errors: Errors) -> Vec<Part> {
         head += "<span class=\"choice note\" data-axis=\"0\">";
         for (k, (unit, _)) in errors.pictures.iter().enumerate() {
             let on = if k == 0 { " class=\"on\"" } else { "" };
-            let _ = write!(head, "<button type=\"button\"{on} data-value=\"{unit}\">{unit}</button>");
+            head += &format!("<button type=\"button\"{on} data-value=\"{unit}\">{unit}</button>");
         }
         head += "</span>";
     }
@@ -130,9 +127,8 @@ fn error_card(verdict: &Verdict, errors: Errors) -> Vec<Part> {
         many => format!("The tightest of {many} limits of requirements.tracking. "),
     };
     let sign = if judged.is_empty() { mark("none") } else { String::new() };
-    let _ = writeln!(
-        content,
-        "<p class=\"legend\" style=\"display:flex;gap:4px\">{sign}<span>{open}{}</span></p></div>",
+    content += &format!(
+        "<p class=\"legend\" style=\"display:flex;gap:4px\">{sign}<span>{open}{}</span></p></div>\n",
         marked(&errors.note)
     );
     parts.push(Part::Html(content));
@@ -171,7 +167,7 @@ fn controller_card(compiled: &Compilation, verdict: &Verdict, measured: Result<&
             for what in ["time", "memory", "bits"] {
                 content += &text_row(what, "not measured", "none");
             }
-            let _ = writeln!(content, "<p class=\"legend\">{}</p>", marked(why));
+            content += &format!("<p class=\"legend\">{}</p>\n", marked(why));
         }
     }
     // A board is emulated by another machine with its core.
@@ -256,7 +252,6 @@ fn platform_card(model: &Model, view: Part, note: &str) -> Vec<Part> {
 
 /// The page of a refused spec. `model`: as far as it could be read; `accepted`: whether the fix of the first error
 /// was tried and works.
-#[must_use]
 pub fn refused(text: &SpecSource, all: &[Diagnostic], model: Option<&Model>, accepted: bool) -> Vec<Part> {
     let errors: Vec<&Diagnostic> = all.iter().filter(|finding| finding.severity == Severity::Error).collect();
     let Some(first) = errors.first() else { return Vec::new() };

@@ -8,7 +8,6 @@ use specgen_studies::tuning::{Candidate, Score};
 const SMALLEST: f64 = 2.5;
 
 /// The plot as SVG. `axes` name effort and error (nm rms), `marks` are named scores, such as the start of the search.
-#[must_use]
 pub fn svg(title: &str, axes: [&str; 2], all: &[Candidate], front: &[Candidate], marks: &[(&str, Score)]) -> String {
     let scores = || all.iter().map(|c| &c.score).chain(marks.iter().map(|(_, score)| score));
     // A few very poor candidates would compress everything else into a corner.

@@ -13,7 +13,6 @@ pub struct Grid {
 
 impl Grid {
     /// A table without rows.
-    #[must_use]
     pub fn new(caption: &str, head: &[&str]) -> Self {
         Self {
             caption: caption.to_owned(),

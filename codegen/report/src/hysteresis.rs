@@ -91,7 +91,6 @@ pub fn of_platform(
 }
 
 /// The simulated loops of six equal legs with their own gauges.
-#[must_use]
 pub fn of_legs(leg: &LegParameters, lowest: f64, records: &[Option<Report>]) -> Section {
     let (chart, width) = loops(leg, lowest, &FREQUENCIES, "loops-0", "A leg without compensation, by rate");
     let mut steps = vec![("loop, no model", width * 1e3)];
@@ -102,7 +101,6 @@ pub fn of_legs(leg: &LegParameters, lowest: f64, records: &[Option<Report>]) -> 
 }
 
 /// Fig. 3: loops at the paper's frequencies; `lowest` is the voltage at which the leg rests, V.
-#[must_use]
 pub fn of_paper(leg: &LegParameters, lowest: f64) -> Section {
     let title = "Fig. 3: displacement over voltage, second period of a sine over the whole range";
     let (chart, _) = loops(leg, lowest, &PAPER, "paper-loops", title);

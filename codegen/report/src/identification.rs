@@ -27,7 +27,6 @@ fn residual(title: &str, trace: &Trace) -> Chart {
 
 /// Loops and model, residual, Preisach plane with unexcited cells hatched, and the choice of the grid or the
 /// validation, if any.
-#[must_use]
 pub fn everett(identified: &Identification, choice: Option<&GridChoice>, validation: Option<&Prediction>) -> String {
     let (report, trace) = (&identified.report, &identified.trace);
     let loops = panel("Loops", Axis::linear("drive", "V"), Axis::linear("displacement", "µm"))
@@ -67,7 +66,6 @@ fn error(prediction: &Prediction) -> Option<Chart> {
 }
 
 /// Predicted loops, displacement over time, and error for a drive.
-#[must_use]
 pub fn prediction(prediction: &Prediction) -> String {
     let over = |x: &[f64], y: &[f64]| x.iter().zip(y).map(|(x, y)| [*x, y * 1e6]).collect::<Vec<_>>();
     let chart = |title: &str, axis: Axis, x: &[f64]| {
@@ -88,7 +86,6 @@ pub fn prediction(prediction: &Prediction) -> String {
 }
 
 /// Errors of each option over the rates of the records, fitted to all records and to the others.
-#[must_use]
 pub fn rate(report: &RateReport) -> String {
     let chart = |title: &str, left_out: bool| {
         let empty = panel(title, Axis::linear("curves per second", "Hz"), Axis::linear("error", "% of range, rms"));
@@ -149,16 +146,15 @@ fn plane(identified: &Identification) -> Chart {
     chart.with("up = down", Mark::Line(1.0), ends.to_vec()).colored(GREY)
 }
 
+/// A vertical bar from below a value to above it, in units of `1 / scale`.
+fn bar(x: f64, value: f64, half: f64, scale: f64) -> [[f64; 2]; 3] {
+    [[x, (value - half) * scale], [x, (value + half) * scale], [f64::NAN; 2]]
+}
+
 fn curve(choice: &GridChoice) -> Chart {
     let points: Vec<[f64; 2]> = choice.scores.iter().map(|s| [s.grid as f64, s.held_out_rms * 1e9]).collect();
     let chosen = points.iter().copied().filter(|p| p[0] == choice.chosen as f64).collect();
-    let mut bars = Vec::new();
-    for s in &choice.scores {
-        let x = s.grid as f64;
-        bars.push([x, (s.held_out_rms - s.standard_error) * 1e9]);
-        bars.push([x, (s.held_out_rms + s.standard_error) * 1e9]);
-        bars.push([f64::NAN; 2]);
-    }
+    let bars = choice.scores.iter().flat_map(|s| bar(s.grid as f64, s.held_out_rms, s.standard_error, 1e9)).collect();
     panel(
         &format!("Curves held out: N = {} chosen", choice.chosen),
         Axis::linear("grid N", ""),
@@ -173,7 +169,6 @@ fn curve(choice: &GridChoice) -> Chart {
 }
 
 /// Loops and their lines, and gain over frequency. `records` are in the order given.
-#[must_use]
 pub fn linear(report: &LinearReport, records: &[Record]) -> String {
     let mut loops = panel("Y = ρX + δ", Axis::linear("drive", "V"), Axis::linear("displacement", "µm"));
     let mut rest = panel("Distance from the line", Axis::linear("drive", "V"), Axis::linear("Y − ρX − δ", "nm"));
@@ -194,12 +189,7 @@ pub fn linear(report: &LinearReport, records: &[Record]) -> String {
         loops = loops.with("", Mark::Dashed(1.0), vec![at(low), at(high)]).colored(k);
     }
     let gains: Vec<[f64; 2]> = report.relations.iter().map(|r| [r.frequency, r.gain * 1e6]).collect();
-    let mut bars = Vec::new();
-    for r in &report.relations {
-        bars.push([r.frequency, (r.gain - 2.0 * r.gain_error) * 1e6]);
-        bars.push([r.frequency, (r.gain + 2.0 * r.gain_error) * 1e6]);
-        bars.push([f64::NAN; 2]);
-    }
+    let bars = report.relations.iter().flat_map(|r| bar(r.frequency, r.gain, 2.0 * r.gain_error, 1e6)).collect();
     let reference = vec![[report.reference_frequency, report.reference_gain * 1e6]];
     let gain = panel("Gain over frequency", Axis::log("frequency", "Hz"), Axis::linear("ρ", "µm/V"))
         .with("± 2 standard errors", Mark::Line(1.5), bars)
@@ -222,7 +212,6 @@ pub fn linear(report: &LinearReport, records: &[Record]) -> String {
 }
 
 /// Magnitude, phase and coherence, with the fitted model.
-#[must_use]
 pub fn response(Estimate { record, value: report, .. }: &Estimate<FrequencyResponse>) -> String {
     let shown: Vec<_> = report
         .bins
@@ -284,7 +273,6 @@ pub fn response(Estimate { record, value: report, .. }: &Estimate<FrequencyRespo
 }
 
 /// Calibration and its residual.
-#[must_use]
 pub fn gauge(Estimate { record, value: report, .. }: &Estimate<GaugeCalibration>) -> String {
     let value = |v: f64| report.coefficients.iter().rev().fold(0.0, |sum, c| sum * v + c);
     let [low, high] = report.volts;
@@ -313,7 +301,6 @@ pub fn gauge(Estimate { record, value: report, .. }: &Estimate<GaugeCalibration>
 }
 
 /// Force over displacement without creep, and the residual.
-#[must_use]
 pub fn stiffness(Estimate { record, value: report, .. }: &Estimate<AxialStiffness>) -> String {
     let measured = report.points.iter().map(|p| [p[0], p[1] * 1e9]).collect();
     let [low, high] = report.force;

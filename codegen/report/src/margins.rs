@@ -25,7 +25,6 @@ const LARGEST: f64 = 10.0;
 const DAMPING_RATIOS: [f64; 2] = [1e-3, 1.0];
 
 /// A control mode in full.
-#[must_use]
 pub fn name(law: ControlMode) -> String {
     let name = law.to_string();
     match name.rsplit_once(' ') {
@@ -38,13 +37,11 @@ pub fn name(law: ControlMode) -> String {
 }
 
 /// A control mode in short.
-#[must_use]
 pub fn short_name(law: ControlMode) -> String {
     law.to_string().replace("invhys", "Invhys").replace("ewma", "EWMA").replace("pcc", "PCC")
 }
 
 /// Full name of an adaptation law: `invhys`, `ewma` or `pcc`.
-#[must_use]
 pub fn adapting_name(word: &str) -> &'static str {
     match word {
         "invhys" => "the inverse model",
@@ -54,7 +51,6 @@ pub fn adapting_name(word: &str) -> &'static str {
 }
 
 /// The section. `mode`: the control mode of the spec, as the value of the word `mode`.
-#[must_use]
 pub fn section(compiled: &Compilation, mode: u32, command: &str) -> Section {
     let section = Section::new("margins", "Margins", command);
     let Some((design, task)) = compiled.design.as_ref().zip(compiled.model.task_space.as_ref()) else {

@@ -1,7 +1,5 @@
 //! The page: turns sections into HTML with embedded style, script and data. It loads nothing.
 
-use std::fmt::Write as _;
-
 use serde_json::{Map, Value};
 
 use super::chart::Chart;
@@ -47,17 +45,14 @@ pub struct Head {
 
 /// The page: `first` is the first screen, followed by the sections; at the end the numbers of every figure and `evidence`,
 /// collapsed. The same arguments give the same bytes.
-#[must_use]
 pub fn html(head: &Head, first: &[Part], sections: &[Section], evidence: &[Section]) -> String {
     let mut page = Page { out: String::new(), data: Map::new(), numbers: Vec::new(), figures: 0 };
     let (file, digest) = (escaped(&head.file), escaped(&head.digest));
     let short: String = head.digest.chars().take(16).collect();
-    // Writing to a String cannot fail, here and below.
     let (version, title) = (env!("CARGO_PKG_VERSION"), escaped(&head.title));
     let (refused, digest_shown) = (if head.refused { " class=\"refused-page\"" } else { "" }, escaped(&short));
     let versions = escaped(&head.versions);
-    let _ = write!(
-        page.out,
+    page.out += &format!(
         "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<meta name=\"generator\" content=\"specgen {version}\">\n<title>{file}: {title}</title>\n<link rel=\"icon\" href=\"data:,\">\n<style>\n{STYLE}</style>\n</head>\n<body{refused}>\n{MARKS}<header class=\"top\"><b>{file}</b><code title=\"{digest}\">{digest_shown}</code><span class=\"versions\">{versions}</span>"
     );
     page.out.push_str("<nav>");
@@ -67,7 +62,7 @@ pub fn html(head: &Head, first: &[Part], sections: &[Section], evidence: &[Secti
     page.out
         .extend(sections.iter().map(|section| format!("<a href=\"#{}\">{}</a>", section.id, escaped(&section.title))));
     if let Some([href, text]) = &head.other {
-        let _ = write!(page.out, "<a href=\"{}\">{}</a>", escaped(href), escaped(text));
+        page.out += &format!("<a href=\"{}\">{}</a>", escaped(href), escaped(text));
     }
     page.out.push_str("<a href=\"#tables\">Tables</a></nav><button id=\"theme\" type=\"button\">Light / dark</button></header>\n<noscript><p><strong>The figures are drawn by this page's script, but scripts are disabled.</strong></p></noscript>\n<main>\n");
     page.parts(first);
@@ -75,22 +70,19 @@ pub fn html(head: &Head, first: &[Part], sections: &[Section], evidence: &[Secti
         page.section(section);
     }
     page.tables(evidence);
-    let _ = write!(
-        page.out,
+    page.out += &format!(
         "</main>\n<footer>Command: <code>{}</code><span class=\"digest\"> · digest {digest}</span></footer>\n",
         escaped(&head.command)
     );
     // `</script>` in a text would end the script.
     let data = Value::Object(page.data).to_string().replace("</", "<\\/");
-    let _ = write!(
-        page.out,
+    page.out += &format!(
         "<script type=\"application/json\" id=\"data\">{data}</script>\n<script>\n{SCRIPT}</script>\n</body>\n</html>\n"
     );
     page.out
 }
 
 /// Number of figures on a page with these parts.
-#[must_use]
 pub fn figures(first: &[Part], sections: &[Section]) -> usize {
     let mut page = Page { out: String::new(), data: Map::new(), numbers: Vec::new(), figures: 0 };
     page.parts(first);
@@ -109,8 +101,7 @@ impl Page {
     fn section(&mut self, section: &Section) {
         let chosen = if section.panes.is_empty() { "" } else { " data-choices" };
         let (id, title) = (&section.id, escaped(&section.title));
-        let _ = write!(
-            self.out,
+        self.out += &format!(
             "<section id=\"{id}\" class=\"card section\"{chosen}>\n<div class=\"head\"><h2>{title}</h2><div class=\"tools\">"
         );
         let depth = section.panes.first().map_or(0, |pane| pane.values.len());
@@ -128,24 +119,28 @@ impl Page {
             // Spaces in button names do not separate values.
             let value: Vec<String> = pane.values.iter().map(|value| joined(value)).collect();
             let hidden = if k == 0 { "" } else { " hidden" };
-            let _ = writeln!(self.out, "<div class=\"pane\" data-value=\"{}\"{hidden}>", escaped(&value.join(" ")));
+            self.out += &format!("<div class=\"pane\" data-value=\"{}\"{hidden}>\n", escaped(&value.join(" ")));
             self.parts(&pane.parts);
             self.out.push_str("</div>\n");
         }
-        self.parts(&section.parts);
-        if !section.command.is_empty() {
-            let _ = writeln!(self.out, "<p class=\"again\">Command: <code>{}</code></p>", escaped(&section.command));
-        }
+        self.content(section);
         self.out.push_str("</section>\n");
     }
 
+    /// What is not in a pane, and the command that makes the section.
+    fn content(&mut self, section: &Section) {
+        self.parts(&section.parts);
+        if !section.command.is_empty() {
+            self.out += &format!("<p class=\"again\">Command: <code>{}</code></p>\n", escaped(&section.command));
+        }
+    }
+
     fn choice(&mut self, axis: usize, values: &[&str], first: &str) {
-        let _ = write!(self.out, "<span class=\"choice\" data-axis=\"{axis}\">");
+        self.out += &format!("<span class=\"choice\" data-axis=\"{axis}\">");
         for value in values {
             let on = if *value == first { (" class=\"on\"", true) } else { ("", false) };
             let (class, pressed, data, shown) = (on.0, on.1, escaped(&joined(value)), marked(value));
-            let _ = write!(
-                self.out,
+            self.out += &format!(
                 "<button type=\"button\"{class} aria-pressed=\"{pressed}\" data-value=\"{data}\">{shown}</button>"
             );
         }
@@ -156,31 +151,29 @@ impl Page {
         for part in parts {
             match part {
                 Part::Lead(text) => {
-                    let _ = writeln!(self.out, "<p class=\"lead\">{}</p>", marked(text));
+                    self.out += &format!("<p class=\"lead\">{}</p>\n", marked(text));
                 }
                 Part::Text(text) => {
-                    let _ = writeln!(self.out, "<p class=\"soft\">{}</p>", marked(text));
+                    self.out += &format!("<p class=\"soft\">{}</p>\n", marked(text));
                 }
                 Part::Lines(lines) => {
-                    let _ = writeln!(self.out, "<pre>{}</pre>", escaped(lines));
+                    self.out += &format!("<pre>{}</pre>\n", escaped(lines));
                 }
                 Part::Table(grid) => write_table(&mut self.out, grid),
                 Part::Chart(chart) => {
                     self.keep(chart);
                     self.figures += 1;
                     let (id, title) = (&chart.id, marked(&chart.title));
-                    let _ = writeln!(
-                        self.out,
-                        "<figure class=\"plot only\" data-plot=\"{id}\"><figcaption>{title}</figcaption></figure>"
+                    self.out += &format!(
+                        "<figure class=\"plot only\" data-plot=\"{id}\"><figcaption>{title}</figcaption></figure>\n"
                     );
                 }
                 Part::Multiples(multiples) => self.multiples(multiples),
                 Part::Rows(rows) => {
                     self.figures += 1;
                     let (id, title) = (&rows.id, marked(&rows.title));
-                    let _ = writeln!(
-                        self.out,
-                        "<figure class=\"rows\" data-rows=\"{id}\"><figcaption>{title}</figcaption></figure>"
+                    self.out += &format!(
+                        "<figure class=\"rows\" data-rows=\"{id}\"><figcaption>{title}</figcaption></figure>\n"
                     );
                     let mut data = rows.data.clone();
                     data["title"] = Value::String(rows.title.clone());
@@ -189,12 +182,12 @@ impl Page {
                 }
                 Part::View(id, view) => {
                     self.figures += 1;
-                    let _ = writeln!(self.out, "<figure class=\"view\" data-view=\"{id}\"></figure>");
+                    self.out += &format!("<figure class=\"view\" data-view=\"{id}\"></figure>\n");
                     self.data.insert((*id).to_owned(), view.clone());
                 }
                 Part::Columns(columns) => {
                     let class = if columns.len() == 2 { "two" } else { "three" };
-                    let _ = writeln!(self.out, "<div class=\"columns {class}\">");
+                    self.out += &format!("<div class=\"columns {class}\">\n");
                     for column in columns {
                         self.out.push_str("<div>\n");
                         self.parts(column);
@@ -215,9 +208,8 @@ impl Page {
 
     fn multiples(&mut self, multiples: &Multiples) {
         let selected = multiples.items.get(multiples.selected);
-        let _ = writeln!(
-            self.out,
-            "<div class=\"multiples\" data-multiples=\"{}\" data-selected=\"{}\">\n<div class=\"large\">",
+        self.out += &format!(
+            "<div class=\"multiples\" data-multiples=\"{}\" data-selected=\"{}\">\n<div class=\"large\">\n",
             multiples.id, multiples.selected
         );
         for _ in selected.into_iter().flatten() {
@@ -225,7 +217,7 @@ impl Page {
             self.out.push_str("<figure class=\"plot large\"><figcaption></figcaption></figure>\n");
         }
         let many = if multiples.items.len() > 6 || multiples.groups.len() == 1 { " many" } else { "" };
-        let _ = writeln!(self.out, "</div>\n<div class=\"small{many}\">");
+        self.out += &format!("</div>\n<div class=\"small{many}\">\n");
         if multiples.groups.len() == 2 {
             self.out.extend(
                 multiples.groups.iter().map(|group| format!("<p class=\"caption\">{}</p>\n", marked(&group.title))),
@@ -246,8 +238,7 @@ impl Page {
                 String::new()
             };
             // Its name is that of the picture that the script draws in it.
-            let _ =
-                writeln!(self.out, "<figure class=\"plot\" tabindex=\"0\" role=\"button\"{style}>{caption}</figure>");
+            self.out += &format!("<figure class=\"plot\" tabindex=\"0\" role=\"button\"{style}>{caption}</figure>\n");
         }
         self.out.push_str("</div>\n</div>\n");
         self.data.insert(multiples.id.clone(), multiples.data());
@@ -257,8 +248,7 @@ impl Page {
     fn tables(&mut self, evidence: &[Section]) {
         let numbers: Vec<Grid> =
             std::mem::take(&mut self.numbers).into_iter().filter(|grid| !grid.rows.is_empty()).collect();
-        let _ = write!(
-            self.out,
+        self.out += &format!(
             "<section id=\"tables\" class=\"card section\">\n<div class=\"head\"><h2>Tables</h2></div>\n<p class=\"lead\">The numbers of every figure. All points of a chart can be saved as CSV.</p>\n<details><summary>Numbers of {} figures</summary>\n",
             numbers.len()
         );
@@ -267,12 +257,8 @@ impl Page {
         }
         self.out.push_str("</details>\n");
         for section in evidence {
-            let _ = writeln!(self.out, "<details id=\"{}\"><summary>{}</summary>", section.id, escaped(&section.title));
-            self.parts(&section.parts);
-            if !section.command.is_empty() {
-                let _ =
-                    writeln!(self.out, "<p class=\"again\">Command: <code>{}</code></p>", escaped(&section.command));
-            }
+            self.out += &format!("<details id=\"{}\"><summary>{}</summary>\n", section.id, escaped(&section.title));
+            self.content(section);
             self.out.push_str("</details>\n");
         }
         self.out.push_str("</section>\n");
@@ -284,7 +270,6 @@ fn joined(value: &str) -> String {
 }
 
 /// Escaped text with axis names of angles as subscripts.
-#[must_use]
 pub fn marked(text: &str) -> String {
     let mut out = escaped(text);
     for axis in ["x", "y", "z"] {
@@ -294,11 +279,11 @@ pub fn marked(text: &str) -> String {
 }
 
 fn write_table(out: &mut String, grid: &Grid) {
-    let _ = writeln!(out, "<div class=\"table\"><table>\n<caption>{}</caption>\n<thead><tr>", escaped(&grid.caption));
+    *out += &format!("<div class=\"table\"><table>\n<caption>{}</caption>\n<thead><tr>\n", escaped(&grid.caption));
     let numbers: Vec<bool> = (0..grid.head.len()).map(|column| numeric(grid, column)).collect();
     let class = |column: usize| if numbers.get(column) == Some(&true) { " class=\"n\"" } else { "" };
     for (column, text) in grid.head.iter().enumerate() {
-        let _ = write!(out, "<th scope=\"col\"{}>{}</th>", class(column), escaped(text));
+        *out += &format!("<th scope=\"col\"{}>{}</th>", class(column), escaped(text));
     }
     out.push_str("</tr></thead>\n<tbody>\n");
     for row in &grid.rows {

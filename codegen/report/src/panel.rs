@@ -24,7 +24,6 @@ const SCRIPT: &str = concat!(
 );
 
 /// Static data of a platform for the page: its geometry, limits of the legs (V), its modes (Hz).
-#[must_use]
 pub fn facts(model: &Model, design: Option<&Design>) -> Value {
     let view = match platform::at_rest(model, &[]) {
         Part::View(_, view) => view,
@@ -47,7 +46,6 @@ pub fn facts(model: &Model, design: Option<&Design>) -> Value {
 }
 
 /// The page of a device, with `facts` for its script.
-#[must_use]
 pub fn html(title: &str, facts: &Value) -> String {
     // `</script>` in a text would end the script.
     let facts = facts.to_string().replace("</", "<\\/");

@@ -25,7 +25,6 @@ pub struct Motion {
 
 impl Motion {
     /// The true poses of a run; leg extensions by J at rest.
-    #[must_use]
     pub fn of_platform(platform: &Platform<f64>, run: &PlatformRun, interval: f64) -> Self {
         let jacobian = jacobian(platform, &[0.0; 6]);
         let poses: Vec<[f64; 6]> = run.samples.iter().map(|sample| sample.tick.pose).collect();
@@ -33,7 +32,6 @@ impl Motion {
     }
 
     /// Gauge readings of six legs, and the resulting pose by J⁻¹ at rest. `None` without a platform.
-    #[must_use]
     pub fn of_legs(model: &Model, run: &Tracking) -> Option<Self> {
         let inverse = lower::inverse_jacobian(&model.geometry)?;
         let legs: Vec<[f64; 6]> = run.samples.iter().map(|sample| sample.measured).collect();
@@ -51,7 +49,6 @@ fn product(rows: &[[f64; 6]; 6], vector: &[f64; 6]) -> [f64; 6] {
 }
 
 /// Joints, legs, gauges, work part and dimensions of the platform at rest, with the subjects of `findings` marked.
-#[must_use]
 pub fn at_rest(model: &Model, findings: &[Diagnostic]) -> Part {
     let mut data = geometry(model);
     data["label"] = json!(format!(
@@ -85,7 +82,6 @@ pub fn at_rest(model: &Model, findings: &[Diagnostic]) -> Part {
 }
 
 /// The platform along a motion; bars show each leg within its `travel`, m.
-#[must_use]
 pub fn in_motion(model: &Model, motion: &Motion, travel: f64) -> Part {
     let mut data = geometry(model);
     // Integer nanometres and nanoradians.

@@ -32,7 +32,6 @@ const POINTS: usize = 5000;
 const LETTER: f64 = 6.6;
 
 /// Charts in `columns` columns under a title and a subtitle.
-#[must_use]
 pub fn figure(title: &str, subtitle: &str, charts: &[Chart], columns: usize) -> String {
     let columns = columns.max(1);
     let rows = charts.len().div_ceil(columns).max(1);
@@ -52,7 +51,6 @@ pub fn figure(title: &str, subtitle: &str, charts: &[Chart], columns: usize) -> 
 }
 
 /// An HTML page with the SVG.
-#[must_use]
 pub fn html(title: &str, svg: &str) -> String {
     format!(
         "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>{}</title></head>\n<body>\n{svg}</body></html>\n",

@@ -80,7 +80,6 @@ impl Run {
 }
 
 /// First screen and sections of the page of a run.
-#[must_use]
 pub fn page(compiled: &Compilation, run: &Run) -> (Vec<Part>, Vec<Section>) {
     let model = &compiled.model;
     let sections =
@@ -133,15 +132,9 @@ fn first(compiled: &Compilation, run: &Run) -> Vec<Part> {
     let missing: u64 = run.gaps.iter().map(|(from, to)| to - from).sum();
     let seconds = run.recorded.len() as f64 * model.timing.period;
     let (found, simulated) = (error_rms(&run.recorded), error_rms(run.simulated()));
-    let lengths = if model.task_space.is_some() {
-        norm(&found, false)
-    } else {
-        libm::sqrt(found.iter().map(|v| v * v).sum::<f64>() / 6.0)
-    };
-    let beside = if model.task_space.is_some() {
-        norm(&simulated, false)
-    } else {
-        libm::sqrt(simulated.iter().map(|v| v * v).sum::<f64>() / 6.0)
+    let platform = model.task_space.is_some();
+    let length = |errors: &[f64; 6]| {
+        if platform { norm(errors, false) } else { libm::sqrt(errors.iter().map(|v| v * v).sum::<f64>() / 6.0) }
     };
     let (verdict, mark) = if run.bits.is_err() {
         ("Replaying the record gives different bits", "error")
@@ -153,7 +146,7 @@ fn first(compiled: &Compilation, run: &Run) -> Vec<Part> {
         ("The run is complete", "ok")
     };
     let against = match &run.simulated {
-        Ok(_) => format!("; the simulation of the same commands gives {}\u{2009}nm", short(beside)),
+        Ok(_) => format!("; the simulation of the same commands gives {}\u{2009}nm", short(length(&simulated))),
         Err(why) => format!("; no simulation for comparison: {why}"),
     };
     let sentence = Sentence {
@@ -161,7 +154,7 @@ fn first(compiled: &Compilation, run: &Run) -> Vec<Part> {
         why: format!(
             "{}\u{2009}s recorded. Error {}{against}.",
             short(seconds),
-            error_text(run, lengths, model.timing.period)
+            error_text(run, length(&found), model.timing.period)
         ),
         mark,
     };
@@ -186,23 +179,16 @@ fn first(compiled: &Compilation, run: &Run) -> Vec<Part> {
     }
     let gauges = card("Noise of the gauges, rms", "recorded / spec", "", &content);
     let count = |number: u64| thin(&group(number));
-    let mut content = text_row("late ticks", &count(late.len() as u64), if late.is_empty() { "ok" } else { "warning" });
-    content += &text_row(
-        "missing",
-        &format!("{} ticks in {} gaps", count(missing), run.gaps.len()),
-        if missing == 0 { "ok" } else { "warning" },
-    );
-    content += &text_row(
-        "damaged",
-        &format!("{} blocks", run.damaged.len()),
-        if run.damaged.is_empty() { "ok" } else { "warning" },
-    );
+    let mut content = String::new();
     let limited = run.recorded.iter().filter(|sample| sample.limited).count() as u64;
-    content += &text_row(
-        "at a limit",
-        &format!("{} ticks with a leg at a limit", count(limited)),
-        if limited == 0 { "ok" } else { "warning" },
-    );
+    for (label, text, good) in [
+        ("late ticks", count(late.len() as u64), late.is_empty()),
+        ("missing", format!("{} ticks in {} gaps", count(missing), run.gaps.len()), missing == 0),
+        ("damaged", format!("{} blocks", run.damaged.len()), run.damaged.is_empty()),
+        ("at a limit", format!("{} ticks with a leg at a limit", count(limited)), limited == 0),
+    ] {
+        content += &text_row(label, &text, if good { "ok" } else { "warning" });
+    }
     content += &text_row("faults", &run.faults.to_string(), if run.faults == 0 { "ok" } else { "error" });
     content += &match &run.bits {
         Ok(ticks) => text_row("bits", &format!("identical over {} ticks", count(*ticks)), "ok"),

@@ -4,8 +4,6 @@ mod export;
 mod mcap;
 mod messages;
 mod signals;
-
-use std::fmt::Write as _;
 use std::fs::File;
 use std::io::BufReader;
 use std::path::Path;
@@ -240,24 +238,23 @@ impl Outcome for Report {
         }
         let more = self.phases.len().saturating_sub(SHOWN);
         if more > 0 {
-            // Writing to a String cannot fail, here and below.
-            let _ = writeln!(out, "  … {more} more phase changes");
+            out += &format!("  … {more} more phase changes\n");
         }
         for tick in &self.triggers {
             event(&mut out, *tick, "trigger");
         }
         for (from, to) in &self.gaps {
             let last = to.saturating_sub(1);
-            let _ = writeln!(out, "  ticks {from} to {last} are missing; the record continues after them");
+            out += &format!("  ticks {from} to {last} are missing; the record continues after them\n");
         }
         out.extend(self.damaged.iter().map(|(block, reason)| format!("  block {block} is damaged: {reason}\n")));
         if let Some(tick) = self.lost_from {
-            let _ = writeln!(out, "  the file ends within a block: ticks from {tick} on are lost");
+            out += &format!("  the file ends within a block: ticks from {tick} on are lost\n");
         }
         match &self.first_difference {
             None => out.push_str("  bit-equal\n"),
             Some(difference) => {
-                let _ = writeln!(out, "  first difference: {}", difference.text);
+                out += &format!("  first difference: {}\n", difference.text);
             }
         }
         out

@@ -8,6 +8,7 @@ use specgen_studies::reproduce::table::{Cell, Table as Comparison};
 use specgen_studies::reproduce::write::{cell, digits};
 
 /// A section of the page.
+#[must_use]
 #[derive(Debug, Clone, PartialEq)]
 pub struct Section {
     /// Name of the section in links.
@@ -82,7 +83,6 @@ pub struct Group {
 
 impl Multiples {
     /// Unrelated charts; the first is shown large.
-    #[must_use]
     pub fn gallery(id: &str, charts: Vec<Chart>) -> Self {
         let all = (0..charts.len()).collect();
         let groups = vec![Group { title: String::new(), items: all, range: None }];
@@ -115,38 +115,32 @@ pub struct Rows {
 
 impl Section {
     /// An empty section.
-    #[must_use]
     pub fn new(id: &'static str, title: &str, command: &str) -> Self {
         Self { id, title: title.to_owned(), command: command.to_owned(), parts: Vec::new(), panes: Vec::new() }
     }
 
     /// Adds a part.
-    #[must_use]
     pub fn part(mut self, part: Part) -> Self {
         self.parts.push(part);
         self
     }
 
     /// Adds the sentence with the result.
-    #[must_use]
     pub fn lead(self, text: &str) -> Self {
         self.part(Part::Lead(text.to_owned()))
     }
 
     /// Adds a paragraph.
-    #[must_use]
     pub fn text(self, text: &str) -> Self {
         self.part(Part::Text(text.to_owned()))
     }
 
     /// Adds a table.
-    #[must_use]
     pub fn table(self, table: Grid) -> Self {
         self.part(Part::Table(table))
     }
 
     /// Adds small charts, the first of which is shown large; a single chart is only shown large.
-    #[must_use]
     pub fn charts(self, mut charts: Vec<Chart>) -> Self {
         match charts.len() {
             0 => self,
@@ -159,20 +153,17 @@ impl Section {
     }
 
     /// Adds lines.
-    #[must_use]
     pub fn lines(self, lines: &str) -> Self {
         self.part(Part::Lines(lines.to_owned()))
     }
 
     /// Adds the content for these values of the choices.
-    #[must_use]
     pub fn pane(mut self, values: &[&str], parts: Vec<Part>) -> Self {
         self.panes.push(Pane { values: values.iter().map(|value| (*value).to_owned()).collect(), parts });
         self
     }
 
     /// Adds a table that compares the paper with ours, with its remarks.
-    #[must_use]
     pub fn comparison(mut self, table: &Comparison) -> Self {
         let mut grid =
             Grid::new(table.title, &["case", "quantity", "Hz", "unit", "paper", "ours", "ours / paper", "remark"]);

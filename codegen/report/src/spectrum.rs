@@ -10,7 +10,6 @@ const POINTS: usize = 160;
 /// Cumulative rms up to each frequency (Hz): frequencies and values, logarithmically spaced. The last value is the
 /// rms of all signals together after removing their linear trends. Signals have equal lengths and are sampled every
 /// `interval` (s).
-#[must_use]
 pub fn cumulative(signals: &[&[f64]], interval: f64) -> (Vec<f64>, Vec<f64>) {
     let length = signals.first().map_or(0, |signal| signal.len());
     if length < 8 {
@@ -55,7 +54,6 @@ pub fn cumulative(signals: &[&[f64]], interval: f64) -> (Vec<f64>, Vec<f64>) {
 
 /// Amplitude spectral density of a signal without its linear trend, per root hertz: frequencies (Hz) and values, each the mean
 /// power of a band; bands are logarithmically spaced.
-#[must_use]
 pub fn density(signal: &[f64], interval: f64) -> (Vec<f64>, Vec<f64>) {
     let (frequencies, roots) = cumulative(&[signal], interval);
     let (mut middle, mut values) = (Vec::new(), Vec::new());

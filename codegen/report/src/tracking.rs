@@ -73,7 +73,6 @@ pub struct TrackedPath {
 
 impl TrackedPath {
     /// `1 Hz`, or `own speed` for a waveform.
-    #[must_use]
     pub fn speed(&self) -> String {
         self.frequency.map_or_else(|| "own speed".to_owned(), |hertz| format!("{hertz}\u{2009}Hz"))
     }
@@ -84,27 +83,23 @@ impl TrackedPath {
     }
 
     /// Rms error of each axis, nm and nrad.
-    #[must_use]
     pub fn rms(&self) -> Option<[f64; 6]> {
         self.run.as_ref().map(|run| run.errors.rms_nano())
     }
 
     /// The measured part of the path.
-    #[must_use]
     pub fn coverage(&self) -> Option<Coverage> {
         self.run.as_ref().map(|run| run.errors.coverage())
     }
 }
 
 /// Norm of the errors of three axes.
-#[must_use]
 pub fn norm(rms: &[f64; 6], turning: bool) -> f64 {
     let axes = if turning { &rms[3..] } else { &rms[..3] };
     libm::sqrt(axes.iter().map(|v| v * v).sum())
 }
 
 /// The simulator's form of a path of the paper.
-#[must_use]
 pub fn path(path: PaperPath) -> trajectory::PaperPath {
     match path {
         PaperPath::Case1 => trajectory::PaperPath::Case1,
@@ -114,7 +109,6 @@ pub fn path(path: PaperPath) -> trajectory::PaperPath {
 }
 
 /// The control mode of the spec, as the value of the word `mode`.
-#[must_use]
 pub fn mode_of(controller: &Controller) -> u32 {
     let place = controller.description().config_names.iter().position(|name| name == "mode");
     let word = place.and_then(|place| controller.default_config().get(place).copied());
@@ -174,7 +168,6 @@ pub fn follow(
 }
 
 /// Figures of the runs with limits in the spec, nm and nrad rms.
-#[must_use]
 pub fn figures(model: &Model, all: &[TrackedPath]) -> Vec<Figure> {
     let mut figures = Vec::new();
     for one in all {
@@ -220,7 +213,6 @@ pub struct Line {
 }
 
 /// Rows for the trajectories of a platform, position (nm) or angle (nrad): norm of three axes.
-#[must_use]
 pub fn lines(model: &Model, noise: Option<&[f64; 6]>, all: &[TrackedPath], turning: bool) -> Vec<Line> {
     let mut lines = Vec::new();
     if let Some(noise) = noise {
@@ -257,7 +249,6 @@ fn two_digits(value: f64) -> String {
 }
 
 /// Error chart, `unit` rms; `speeds` are the meanings of hollow and full dots.
-#[must_use]
 pub fn dumbbell(lines: &[Line], speeds: [Option<String>; 2], unit: &str) -> Rows {
     let mut numbers = Grid::new(&format!("Error on trajectories, {unit} rms"), &["trajectory", "own speed", "faster"]);
     let mut rows: Vec<Value> = Vec::new();
@@ -315,7 +306,6 @@ pub fn dumbbell(lines: &[Line], speeds: [Option<String>; 2], unit: &str) -> Rows
 }
 
 /// The section: each trajectory at each speed, per axis.
-#[must_use]
 pub fn section(all: &[TrackedPath], law: &str, interval: f64, corners: bool, command: &str) -> Section {
     let mut section = Section::new("tracking", "Tracking", command);
     // The trajectory with the largest error comes first.

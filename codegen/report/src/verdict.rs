@@ -1,7 +1,5 @@
 //! First screen: the verdict, the deciding figures with their limits, the findings.
 
-use std::fmt::Write as _;
-
 use specgen_language::diagnostic::{Diagnostic, Place, Severity, to_json};
 use specgen_language::spec::SpecSource;
 use specgen_studies::verdict::{Answer, Figure, Mark, Subject, Verdict};
@@ -18,7 +16,6 @@ const TIGHT: f64 = 0.9;
 const SEEN: usize = 3;
 
 /// A mark by its name: `ok`, `warning`, `error`, `none`, `note`.
-#[must_use]
 pub fn mark(name: &str) -> String {
     let label = match name {
         "ok" => "within limit",
@@ -37,13 +34,11 @@ fn mark_of(figure: &Figure) -> &'static str {
 }
 
 /// A number with thin spaces as thousands separators and a true minus sign.
-#[must_use]
 pub fn thin(text: &str) -> String {
     text.replace(',', "\u{2009}").replace('-', "\u{2212}")
 }
 
 /// Used share of the limit; for a lower limit, the limit relative to the value.
-#[must_use]
 pub fn share(figure: &Figure) -> Option<f64> {
     let limit = figure.limit.as_ref()?;
     let share = if limit.least { limit.value / figure.value } else { figure.value / limit.value };
@@ -51,7 +46,6 @@ pub fn share(figure: &Figure) -> Option<f64> {
 }
 
 /// A row of a card: label, value and limit, bar, share, mark.
-#[must_use]
 pub fn limit_row(label: &str, figure: &Figure) -> String {
     let label = &figure.coverage.map_or_else(|| label.to_owned(), |coverage| format!("{label}, {}", coverage.brief()));
     let Some((limit, share)) = figure.limit.as_ref().zip(share(figure)) else {
@@ -67,7 +61,6 @@ pub fn limit_row(label: &str, figure: &Figure) -> String {
 }
 
 /// A row of a card: label, a value of another with their unit, share, name of a mark.
-#[must_use]
 pub fn value_row(label: &str, [asked, has, unit]: [&str; 3], share: f64, mark_name: &str) -> String {
     let percent = 100.0 * share;
     let percent = if percent > 0.0 && percent < 0.95 { format!("{percent:.1}") } else { format!("{percent:.0}") };
@@ -81,7 +74,6 @@ pub fn value_row(label: &str, [asked, has, unit]: [&str; 3], share: f64, mark_na
 }
 
 /// A row of a card with a text instead of a bar.
-#[must_use]
 pub fn text_row(label: &str, text: &str, mark_name: &str) -> String {
     let (label, text, mark) = (marked(label), marked(text), mark(mark_name));
     format!("<div class=\"limit plain\"><span>{label}</span><span class=\"value\">{text}</span>{mark}</div>\n")
@@ -93,11 +85,10 @@ fn bar(share: f64) -> String {
     let beyond = if share > 1.0 { (if share < 1.25 { share * LIMIT } else { BAR }) - LIMIT } else { 0.0 };
     let mut hatch = String::new();
     if beyond > 0.0 {
-        let _ =
-            write!(hatch, "<rect x=\"{LIMIT}\" y=\"5\" width=\"{beyond:.1}\" height=\"8\" fill=\"var(--orange)\"/>");
+        hatch += &format!("<rect x=\"{LIMIT}\" y=\"5\" width=\"{beyond:.1}\" height=\"8\" fill=\"var(--orange)\"/>");
         let mut at = LIMIT + 3.0;
         while at < LIMIT + beyond - 1.0 {
-            let _ = write!(hatch, "<path d=\"M{at:.1} 13l3-8\" stroke=\"var(--card)\" stroke-width=\"1.4\"/>");
+            hatch += &format!("<path d=\"M{at:.1} 13l3-8\" stroke=\"var(--card)\" stroke-width=\"1.4\"/>");
             at += 5.0;
         }
     }
@@ -132,7 +123,6 @@ fn grouped(value: f64, unit: &str, decimals: usize) -> String {
 }
 
 /// A card: title, note on the right, rows.
-#[must_use]
 pub fn card(title: &str, note: &str, class: &str, content: &str) -> String {
     let (title, note) = (marked(title), marked(note));
     format!(
@@ -153,11 +143,8 @@ pub struct Sentence {
 
 impl Sentence {
     /// The sentence for a verdict.
-    #[must_use]
     pub fn of(verdict: &Verdict) -> Self {
-        let judged: Vec<(&Figure, f64)> =
-            verdict.figures.iter().filter_map(|figure| share(figure).map(|share| (figure, share))).collect();
-        let tightest = judged.iter().max_by(|a, b| a.1.total_cmp(&b.1));
+        let tightest = most_used(verdict.figures.iter());
         let within = verdict.figures.iter().filter(|figure| figure.mark == Mark::Within).count();
         let tight = tightest.map_or_else(String::new, |(figure, share)| {
             format!(" Tightest: {}, {:.0}\u{2009}% used.", label(figure), 100.0 * share)
@@ -213,7 +200,6 @@ impl Sentence {
     }
 
     /// The card, with the numbers of errors, warnings and notes.
-    #[must_use]
     pub fn html(&self, findings: &[Diagnostic]) -> String {
         let count = |severity: Severity, name: &str, word: &str| {
             let number = findings.iter().filter(|finding| finding.severity == severity).count();
@@ -233,6 +219,11 @@ impl Sentence {
     }
 }
 
+/// The figure that uses most of its limit, and its share of it.
+fn most_used<'a>(figures: impl Iterator<Item = &'a Figure>) -> Option<(&'a Figure, f64)> {
+    figures.filter_map(|figure| Some((figure, share(figure)?))).max_by(|a, b| a.1.total_cmp(&b.1))
+}
+
 fn label(figure: &Figure) -> String {
     match figure.subject {
         Subject::Reach => format!("reach in {}", figure.name),
@@ -245,23 +236,19 @@ fn label(figure: &Figure) -> String {
 }
 
 /// Rows of a subject.
-#[must_use]
 pub fn rows(verdict: &Verdict, subjects: &[Subject]) -> String {
     let of = |figure: &&Figure| subjects.contains(&figure.subject);
     verdict.figures.iter().filter(of).map(|figure| limit_row(&figure.name, figure)).collect()
 }
 
 /// For phones: the tightest figure of each group.
-#[must_use]
 pub fn tightest(verdict: &Verdict, error: &str) -> String {
     let mut content = String::new();
     for (subject, prefix) in
         [(Subject::Reach, "reach "), (Subject::Time, ""), (Subject::Memory, ""), (Subject::Margins, "margin ")]
     {
         let all = verdict.figures.iter().filter(|figure| figure.subject == subject);
-        let found =
-            all.filter_map(|figure| share(figure).map(|share| (figure, share))).max_by(|a, b| a.1.total_cmp(&b.1));
-        if let Some((figure, _)) = found {
+        if let Some((figure, _)) = most_used(all) {
             content += &limit_row(&format!("{prefix}{}", figure.name), figure);
         }
     }
@@ -274,9 +261,7 @@ pub fn tightest(verdict: &Verdict, error: &str) -> String {
         );
     }
     let judged = verdict.figures.iter().filter(|figure| figure.subject == Subject::Tracking && figure.limit.is_some());
-    let worst =
-        judged.filter_map(|figure| share(figure).map(|share| (figure, share))).max_by(|a, b| a.1.total_cmp(&b.1));
-    content += &match worst {
+    content += &match most_used(judged) {
         Some((figure, _)) => limit_row("error", figure),
         None => text_row("error", error, "none"),
     };
@@ -284,7 +269,6 @@ pub fn tightest(verdict: &Verdict, error: &str) -> String {
 }
 
 /// Findings, one row per code with all places.
-#[must_use]
 pub fn findings(title: &str, note: &str, findings: &[Diagnostic], source: &SpecSource) -> String {
     let list = to_json(findings, source);
     let all: Vec<&serde_json::Value> = list.as_array().into_iter().flatten().collect();
@@ -322,9 +306,8 @@ pub fn findings(title: &str, note: &str, findings: &[Diagnostic], source: &SpecS
         let (class, mark) = (if row < SEEN { "" } else { " more" }, mark(name));
         let (message, places) = (marked(&sentence(&first.message)), escaped(&places.join(", ")));
         let help = marked(&pretty(&first.help));
-        let _ = writeln!(
-            content,
-            "<div class=\"finding{class}\">{mark}<div><b>{code}</b>{count}</div><div>{message}{more} <code class=\"soft\">{places}</code></div><div><b>Do:</b> {help}</div></div>"
+        content += &format!(
+            "<div class=\"finding{class}\">{mark}<div><b>{code}</b>{count}</div><div>{message}{more} <code class=\"soft\">{places}</code></div><div><b>Do:</b> {help}</div></div>\n"
         );
     }
     if codes.is_empty() {
@@ -336,7 +319,6 @@ pub fn findings(title: &str, note: &str, findings: &[Diagnostic], source: &SpecS
 }
 
 /// Source of the first error: its line and neighbours, the word underlined, and a line that fixes it.
-#[must_use]
 pub fn source(findings: &[Diagnostic], source: &SpecSource, accepted: bool) -> String {
     let Some(first) = findings.iter().find(|finding| finding.severity == Severity::Error) else { return String::new() };
     let title = specgen_language::diagnostic::codes::REGISTRY
@@ -357,7 +339,7 @@ pub fn source(findings: &[Diagnostic], source: &SpecSource, accepted: bool) -> S
         for number in line.saturating_sub(1).max(1)..=(line + 1).min(lines.len()) {
             let text = lines.get(number - 1).copied().unwrap_or_default();
             if number != line {
-                let _ = writeln!(content, "<div><b>{number}</b><span>{}</span></div>", escaped(text));
+                content += &format!("<div><b>{number}</b><span>{}</span></div>\n", escaped(text));
                 continue;
             }
             let cut = |at: usize| {
@@ -369,14 +351,12 @@ pub fn source(findings: &[Diagnostic], source: &SpecSource, accepted: bool) -> S
             };
             let (from, to) = (cut(span.start), cut(span.end));
             let (before, bad, after) = (escaped(&text[..from]), escaped(&text[from..to]), escaped(&text[to..]));
-            let _ =
-                writeln!(content, "<div class=\"bad\"><b>{number}</b><span>{before}<u>{bad}</u>{after}</span></div>");
+            content += &format!("<div class=\"bad\"><b>{number}</b><span>{before}<u>{bad}</u>{after}</span></div>\n");
             if let Some(replacement) = first.replacement.as_ref().filter(|_| accepted) {
                 let line = format!("{}{replacement}{}", &text[..from], &text[to..]);
                 let (before, new, after) = (escaped(&text[..from]), escaped(replacement), escaped(&text[to..]));
-                let _ = writeln!(
-                    content,
-                    "<div class=\"fix\"><b>+</b><span>{before}<strong>{new}</strong>{after}   # checked: accepted</span></div>"
+                content += &format!(
+                    "<div class=\"fix\"><b>+</b><span>{before}<strong>{new}</strong>{after}   # checked: accepted</span></div>\n"
                 );
                 fix = Some(line);
             }
@@ -390,9 +370,8 @@ pub fn source(findings: &[Diagnostic], source: &SpecSource, accepted: bool) -> S
     });
     let (message, help, code) = (marked(&sentence(&first.message)), marked(&pretty(&first.help)), &first.code);
     let explained = marked(&title.1);
-    let _ = writeln!(
-        content,
-        "<p>{message}</p><div class=\"do\"><span><b>Do:</b> {help}</span><span>{copy}<button type=\"button\" data-toggle=\"explain\">Explain {code}</button></span></div><p id=\"explain\" class=\"soft\" hidden>{explained}</p>"
+    content += &format!(
+        "<p>{message}</p><div class=\"do\"><span><b>Do:</b> {help}</span><span>{copy}<button type=\"button\" data-toggle=\"explain\">Explain {code}</button></span></div><p id=\"explain\" class=\"soft\" hidden>{explained}</p>\n"
     );
     let (mark, code, title, place) = (mark("error"), &first.code, marked(&capital(&title.0)), escaped(&place));
     format!(
@@ -414,13 +393,12 @@ fn pretty(text: &str) -> String {
 }
 
 /// A message as a sentence.
-#[must_use]
 pub fn sentence(text: &str) -> String {
     let text = capital(&pretty(text));
     if text.ends_with(['.', '!', '?']) { text } else { format!("{text}.") }
 }
 
-fn capital(text: &str) -> String {
+pub(crate) fn capital(text: &str) -> String {
     let mut letters = text.chars();
     letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
 }

@@ -69,7 +69,6 @@ pub struct Dynamics {
 
 /// The inverse dynamics of a compiled spec at a pose from rest (m, rad) with its first and second time derivatives, rounded to the
 /// controller's arithmetic.
-#[must_use]
 pub fn dynamics(ir: &Ir, motion: &Motion<f64>) -> Dynamics {
     match ir.scalar {
         Scalar::F32 => dynamics_in::<f32>(ir, motion),

@@ -275,13 +275,11 @@ impl ModelLegs {
     }
 
     /// The drives last applied, cells of the table.
-    #[must_use]
     pub fn drives(&self) -> [f64; LEGS] {
         self.memory.each_ref().map(|memory| each!(memory, memory => memory.drive()))
     }
 
     /// The displacements at the end of the last tick, m.
-    #[must_use]
     pub fn displacements(&self) -> [f64; LEGS] {
         self.memory.each_ref().map(|memory| each!(memory, memory => memory.displacement()))
     }

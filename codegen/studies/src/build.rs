@@ -1,6 +1,4 @@
 //! The main command: turns a spec into a workspace, builds and checks it, and measures it if the tools are installed.
-
-use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use host_sim::controller::TickController;
@@ -228,16 +226,15 @@ impl Summary {
     fn details(&self) -> String {
         let mut out = String::new();
         let budget = &self.limits.budget;
-        // Writing to a String cannot fail.
-        let _ = writeln!(out, "{} → {} (f{}, digest {})", self.name, self.output, self.bits, &self.digest[..16]);
+        out += &format!("{} → {} (f{}, digest {})\n", self.name, self.output, self.bits, &self.digest[..16]);
         out.push_str(&self.found);
         let (tables, plural, grid) = (self.tables, if self.tables == 1 { "" } else { "s" }, self.grid);
         let bytes = group(self.table_bytes as u64);
         if tables > 0 {
-            let _ = writeln!(out, "  tables: {tables} Everett table{plural} of N = {grid}, {bytes} bytes");
+            out += &format!("  tables: {tables} Everett table{plural} of N = {grid}, {bytes} bytes\n");
         }
         if let Some(library) = &self.host_library {
-            let _ = writeln!(out, "  host library: {library} (links only without a panic path)");
+            out += &format!("  host library: {library} (links only without a panic path)\n");
         }
         let of = |budget: Option<u64>| budget.map_or(String::new(), |b| format!(" of {}", group(b)));
         let bound = |bytes: Option<u64>| {
@@ -246,51 +243,48 @@ impl Summary {
         let flash = |out: &mut String, [all, code, constants, tick]: [u64; 4]| {
             let (used, limit, code_bytes) = (group(all), of(budget.flash), group(code));
             let (constant_bytes, reached) = (group(constants), group(tick));
-            let _ = writeln!(
-                out,
-                "    flash         {used}{limit} bytes: {code_bytes} code, {constant_bytes} constants; the tick reaches {reached} bytes of code"
+            *out += &format!(
+                "    flash         {used}{limit} bytes: {code_bytes} code, {constant_bytes} constants; the tick reaches {reached} bytes of code\n"
             );
         };
         if let Some(i) = &self.image {
-            let _ = writeln!(out, "  {} ({}), not run:", i.machine, i.compiler);
+            out += &format!("  {} ({}), not run:\n", i.machine, i.compiler);
             flash(&mut out, [i.flash, i.code, i.constants, i.tick_code]);
             out.push_str(
                 "    RAM           not measured: the sizes of State and settings are known only at run time\n",
             );
-            let _ = writeln!(out, "    tick stack    {} (static)", bound(i.stack_bound));
+            out += &format!("    tick stack    {} (static)\n", bound(i.stack_bound));
         }
         if let Some(m) = &self.measurement {
-            let _ = writeln!(out, "  {} ({}):", m.machine, m.compiler);
+            out += &format!("  {} ({}):\n", m.machine, m.compiler);
             flash(&mut out, [m.flash, m.code, m.constants, m.tick_code]);
             let ram = m.used.ram.map_or_else(
                 || "unknown: the tick's stack is unbounded".to_owned(),
                 |ram| format!("{}{} bytes including the tick's stack", group(ram), of(budget.ram)),
             );
-            let _ = writeln!(out, "    RAM           {ram}, of which State {}", group(m.state));
+            out += &format!("    RAM           {ram}, of which State {}\n", group(m.state));
             let (bound, measured) = (bound(m.stack_bound), group(m.stack_painted));
-            let _ = writeln!(out, "    tick stack    {bound} (static), {measured} measured");
+            out += &format!("    tick stack    {bound} (static), {measured} measured\n");
             for stage in &m.stages {
                 let budget = if stage.name == "step" { of(budget.instructions) } else { String::new() };
                 let (name, mean, least) = (&stage.name, group(stage.mean.round() as u64), group(stage.min));
                 let (most, calls) = (group(stage.max), group(stage.calls));
-                let _ =
-                    writeln!(out, "    {name:<13} {mean}{budget} instructions mean, {least} to {most} ({calls} calls)");
+                out += &format!("    {name:<13} {mean}{budget} instructions mean, {least} to {most} ({calls} calls)\n");
             }
             if let Some(estimate) = &m.time {
-                let _ = writeln!(out, "  {}:\n{}", estimate.board, firmware::time::text(estimate).trim_end());
+                out += &format!("  {}:\n{}\n", estimate.board, firmware::time::text(estimate).trim_end());
             }
             match &m.first_difference {
                 None => {
-                    let _ =
-                        writeln!(out, "    host and {} agree in every bit over {} ticks", m.machine, group(m.ticks));
+                    out += &format!("    host and {} agree in every bit over {} ticks\n", m.machine, group(m.ticks));
                 }
                 Some(difference) => {
-                    let _ = writeln!(out, "    host and {} DIFFER: {difference}", m.machine);
+                    out += &format!("    host and {} DIFFER: {difference}\n", m.machine);
                 }
             }
         }
         if let Some(missing) = &self.missing {
-            let _ = writeln!(out, "  {missing}");
+            out += &format!("  {missing}\n");
         }
         out
     }

@@ -4,7 +4,6 @@ pub mod fmu;
 
 use std::alloc::Layout;
 use std::collections::BTreeSet;
-use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
 
@@ -158,32 +157,31 @@ fn header(machine: &Supervised) -> String {
     let [state, config, whole] = controller.layouts();
     let (real, bits) = if about.scalar.bits() == 32 { ("float", "uint32_t") } else { ("double", "uint64_t") };
     let mut text = String::new();
-    // Writing to a String cannot fail.
     for (what, names) in
         [("CONFIG", about.config_names.clone()), ("INPUT", machine.input_names()), ("OUTPUT", machine.output_names())]
     {
-        let _ = writeln!(text, "enum {{");
+        text += "enum {\n";
         let mut gauges = None;
         for (place, name) in names.iter().enumerate() {
-            let _ = writeln!(text, "    SPECGEN_{what}_{} = {place},", identifier(name));
+            text += &format!("    SPECGEN_{what}_{} = {place},\n", identifier(name));
             if what == "INPUT" && (name == "gauge[0]" || name == "displacement[0]") {
                 gauges = Some(place);
             }
         }
         if let Some(place) = gauges {
-            let _ = writeln!(text, "    SPECGEN_INPUT_GAUGES = {place},");
+            text += &format!("    SPECGEN_INPUT_GAUGES = {place},\n");
         }
         let own = if what == "CONFIG" { names.len() } else { names.len() - 2 };
-        let _ = writeln!(text, "    SPECGEN_{what}_WORDS = {own}{}", if what == "CONFIG" { "" } else { "," });
+        text += &format!("    SPECGEN_{what}_WORDS = {own}{}\n", if what == "CONFIG" { "" } else { "," });
         if what != "CONFIG" {
-            let _ = writeln!(text, "    SPECGEN_MACHINE_{what}_WORDS = {}", names.len());
+            text += &format!("    SPECGEN_MACHINE_{what}_WORDS = {}\n", names.len());
         }
         text += "};\n\n";
     }
     for (what, values) in [("REQUEST", &REQUESTS[..]), ("EVENT", &EVENTS[..])] {
         let lines: Vec<String> =
             values.iter().map(|(name, value)| format!("    SPECGEN_{what}_{name} = {value}")).collect();
-        let _ = write!(text, "enum {{\n{}\n}};\n\n", lines.join(",\n"));
+        text += &format!("enum {{\n{}\n}};\n\n", lines.join(",\n"));
     }
     let texts =
         [("@name@", &about.name), ("@digest@", &about.digest), ("@version@", &about.version), ("@words@", &text)];

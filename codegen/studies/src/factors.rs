@@ -39,13 +39,11 @@ specgen_language::named! {
 
 impl Factor {
     /// Whether each leg has its own value in a random machine.
-    #[must_use]
     pub fn of_each_leg(self) -> bool {
         matches!(self, Self::Stiffness | Self::Gain | Self::Hysteresis | Self::Creep | Self::Lag | Self::GaugeLag)
     }
 
     /// The nominal value.
-    #[must_use]
     pub fn nominal(self) -> f64 {
         if matches!(self, Self::DelayTicks | Self::Structure) { 0.0 } else { 1.0 }
     }
@@ -173,7 +171,6 @@ pub struct Factors(Vec<FactorRange>);
 
 impl Factors {
     /// Ranges from the options, else from the spec, else the defaults.
-    #[must_use]
     pub fn of(model: &Model, given: &[UserRange]) -> Self {
         let declared = &model.robust;
         let about = |part: f64| [1.0 - part, 1.0 + part];
@@ -216,7 +213,6 @@ impl Factors {
     }
 
     /// The range of one parameter.
-    #[must_use]
     pub fn range(&self, factor: Factor) -> [f64; 2] {
         // Every parameter has an entry; nominal otherwise.
         self.0.iter().find(|one| one.factor == factor).map_or([factor.nominal(); 2], |one| one.range)

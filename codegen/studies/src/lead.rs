@@ -36,14 +36,12 @@ pub struct LeadOf {
 
 impl LeadOf {
     /// Whether the best lead is so much better that it should be proposed.
-    #[must_use]
     pub fn is_proposed(&self) -> bool {
         self.errors[1] < WORTH * self.errors[0]
     }
 }
 
 /// The lead of each trajectory of the paper's kinds; none for six legs. Waveforms are splines without corners and use the usual lead.
-#[must_use]
 pub fn of(compiled: &Compilation) -> Vec<LeadOf> {
     let model = &compiled.model;
     let Some((task, learnable)) = model.task_space.as_ref().zip(Learnable::of(compiled)) else { return Vec::new() };
@@ -69,7 +67,6 @@ pub fn of(compiled: &Compilation) -> Vec<LeadOf> {
 }
 
 /// The path as the simulator plays it.
-#[must_use]
 pub fn streamed(path: model::PaperPath) -> PaperPath {
     match path {
         model::PaperPath::Case1 => PaperPath::Case1,

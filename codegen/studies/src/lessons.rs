@@ -1,8 +1,6 @@
 //! The command `learn`: options, the kept correction, and the report.
 
 mod excite;
-
-use std::fmt::Write as _;
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::sync::atomic::Ordering;
@@ -432,10 +430,8 @@ impl Outcome for Lesson {
         };
         let mut text = format!("{name}: {motion}, {gained} ({machine})\n");
         text.push_str(&format!("  each pass measured over {}\n", best.coverage));
-        // Writing to a String cannot fail, here and below.
-        let _ = writeln!(
-            text,
-            "  learned {low:.1} to {high:.0} Hz; each pass multiplies the error by at most {:.2} {}, worst at {:.0} Hz",
+        text += &format!(
+            "  learned {low:.1} to {high:.0} Hz; each pass multiplies the error by at most {:.2} {}, worst at {:.0} Hz\n",
             convergence.radius,
             if convergence.measured {
                 "for the\n  measured response"

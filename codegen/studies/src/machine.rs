@@ -32,7 +32,6 @@ const STEPS: [f64; 2] = [1e-7, 2e-5];
 const SETTLE: f64 = 0.2;
 
 /// The failure of a command whose simulated run failed.
-#[must_use]
 pub fn run_failure(error: RunError) -> Failure {
     let message = error.to_string();
     match error {
@@ -85,7 +84,6 @@ impl PlantOptions {
     }
 
     /// The same with another leg.
-    #[must_use]
     pub fn platform_of(&self, model: &Model, task: &TaskSpace, leg: &LegParameters) -> (Specimen, PlatformScenario) {
         let specimen = specimen(model, task, leg, Some(self.seed));
         let noise = if self.no_noise { Noise::NONE } else { Noise::of(&specimen) };
@@ -95,7 +93,6 @@ impl PlantOptions {
 }
 
 /// Six legs with these parameters under the voltages of the spec, prepared.
-#[must_use]
 pub fn legs(
     model: &Model,
     parameters: &[LegParameters; LEGS],
@@ -109,7 +106,6 @@ pub fn legs(
 
 /// A machine of the spec with tolerances from `seed` (legs ± 10 %, stiffness ± 5 %), or nominal if `None`. `leg`
 /// gives the shape of the hysteresis.
-#[must_use]
 pub fn specimen(model: &Model, task: &TaskSpace, leg: &LegParameters, seed: Option<u64>) -> Specimen {
     let leg = self::leg(model, leg);
     let mut nominal = nominal(model, task);
@@ -131,7 +127,6 @@ pub fn specimen(model: &Model, task: &TaskSpace, leg: &LegParameters, seed: Opti
 
 /// That machine, prepared, with the gauges of the spec and steps of one control interval; `noise` is from [`Noise::of`] or
 /// [`Noise::NONE`].
-#[must_use]
 pub fn scenario(model: &Model, task: &TaskSpace, specimen: &Specimen, noise: &Noise, seed: u64) -> PlatformScenario {
     let mut options = RunOptions::new(model.timing.period, bias(task));
     options.settle = SETTLE;
@@ -151,7 +146,6 @@ pub fn scenario(model: &Model, task: &TaskSpace, specimen: &Specimen, noise: &No
 }
 
 /// The trajectory with this number, as the controller plays it; `None` if the spec has none.
-#[must_use]
 pub fn on_board(compiled: &Compilation, selector: u32) -> Option<OnBoard> {
     let setpoints = &compiled.ir.task_space.as_ref()?.setpoints;
     let path = &setpoints.trajectories.get(selector as usize)?.path;
@@ -170,7 +164,6 @@ pub(crate) fn bias(task: &TaskSpace) -> [f64; 6] {
 
 /// A leg with the displacement (µm), the voltages (V, from the lowest), the lag (s) and the noise of the spec; everything else,
 /// such as the shape of the hysteresis and the creep, is that of `leg`.
-#[must_use]
 pub fn leg(model: &Model, leg: &LegParameters) -> LegParameters {
     let [low, high] = model.actuator.voltage;
     let stretch = (high - low) / leg.u_max;
@@ -232,7 +225,6 @@ pub struct StructureRange {
 
 impl StructureRange {
     /// That of a spec, up to 5 kHz and three times the least damping ratio; `machine` gives the default of f0.
-    #[must_use]
     pub fn of(model: &Model, machine: &Specimen) -> Self {
         let declared = &model.structure;
         let lowest = machine.structure().modes().0[0] / core::f64::consts::TAU;
@@ -281,7 +273,6 @@ pub struct StructureShares {
 
 impl StructureShares {
     /// Only a mode, of one of several kinds, that is hardest to tolerate: with the lowest frequency and the least damping.
-    #[must_use]
     pub fn worst(kind: usize, kinds: usize) -> Self {
         let mode = [(kind as f64 + 0.5) / kinds as f64, 0.0, 0.0];
         Self { mode, joints: 0.0, mains: [0.0; 3], drift: [0.5; LEGS], cable: [0.0; 2], jitter: 0.0 }

@@ -1,7 +1,5 @@
 //! Records reversal curves of a simulated leg outside the controller's model class, or only computes the drive signal
 //! for a generator.
-
-use std::fmt::Write as _;
 use std::path::Path;
 
 use host_sim::forc::{RandomDrive, ReversalExperiment, ReversalRecord, trimmed};
@@ -128,8 +126,7 @@ fn faster(slow: &ReversalExperiment) -> ReversalExperiment {
 fn csv(drive: &[f64], sampling: f64) -> String {
     let mut text = String::from("time_s,drive_V\n");
     for (k, u) in drive.iter().enumerate() {
-        // Writing to a String cannot fail.
-        let _ = writeln!(text, "{},{}", trimmed(k as f64 / sampling, 8), trimmed(*u, 6));
+        text += &format!("{},{}\n", trimmed(k as f64 / sampling, 8), trimmed(*u, 6));
     }
     text
 }

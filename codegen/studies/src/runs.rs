@@ -1,7 +1,5 @@
 //! Runs of a spec's own controller: its laws and trajectories, and the errors of a trajectory played on board.
 
-use std::fmt::Write as _;
-
 use host_sim::coverage::Coverage;
 use host_sim::platform::table::{AXES, PoseErrors};
 use host_sim::scenario::MODES;
@@ -93,11 +91,9 @@ impl TrajectoryErrors {
         let mut out = format!("{trajectory}, on board, {coverage}: true pose minus controller target\n");
         for (axis, name) in AXES.iter().enumerate() {
             let unit = if axis < 3 { "nm" } else { "nrad" };
-            // Writing to a String cannot fail, here and below.
-            let _ =
-                writeln!(out, "  {name:<5}{:>10.2} {unit} rms{:>10.2} {unit} peak", rms_nano[axis], peak_nano[axis]);
+            out += &format!("  {name:<5}{:>10.2} {unit} rms{:>10.2} {unit} peak\n", rms_nano[axis], peak_nano[axis]);
         }
-        let _ = writeln!(out, "  x,y,z{translation_nm:>10.2} nm rms, norm of the three");
+        out += &format!("  x,y,z{translation_nm:>10.2} nm rms, norm of the three\n");
         out
     }
 }

@@ -58,7 +58,6 @@ pub struct Verdict {
 
 impl Verdict {
     /// The verdict on a compiled spec before it is built. `unmeasured`: why it is not.
-    #[must_use]
     pub fn of(compiled: &Compilation, unmeasured: &str) -> Self {
         let warnings = compiled.findings.iter().filter(|finding| finding.severity == Severity::Warning).count();
         let mut verdict = Self {
@@ -141,7 +140,6 @@ impl Verdict {
     }
 
     /// The answer as a sentence.
-    #[must_use]
     pub fn headline(&self) -> String {
         let name = &self.name;
         let kept = match self.figures.iter().filter(|figure| figure.mark == Mark::Within).count() {
@@ -171,7 +169,6 @@ impl Verdict {
     }
 
     /// The figures of a subject, in one line; `None` if there are none.
-    #[must_use]
     pub fn line(&self, subject: Subject) -> Option<String> {
         let figures: Vec<&Figure> = self.figures.iter().filter(|figure| figure.subject == subject).collect();
         let groups: Vec<&[&Figure]> = figures.chunk_by(share_a_group).collect();
@@ -191,7 +188,6 @@ impl Verdict {
 
     /// At most ten lines of at most [`WIDTH`] characters, eleven with limits on errors: the answer, one line per subject, assumptions, and
     /// next commands.
-    #[must_use]
     pub fn text(&self) -> String {
         let mut lines = vec![self.headline()];
         let known = |subject: &Subject| self.line(*subject).map(|line| format!("  {:<9}{line}", subject.name()));

@@ -128,7 +128,6 @@ pub struct Stage {
 
 impl Measurement {
     /// Instructions of a stage.
-    #[must_use]
     pub fn stage(&self, name: &str) -> Option<&Stage> {
         self.stages.iter().find(|stage| stage.name == name)
     }
@@ -263,7 +262,6 @@ fn per_tick(stats: &target::replay::ReplayStats) -> Vec<(String, u64)> {
 }
 
 /// The inputs of the record, one row per tick.
-#[must_use]
 pub fn inputs(host: &Trace) -> Vec<Vec<u64>> {
     let per_row = host.description().input_names.len();
     host.rows().map(|row| row[..per_row].to_vec()).collect()

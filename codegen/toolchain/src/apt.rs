@@ -102,7 +102,6 @@ impl Apt {
     }
 
     /// The command as shown to the user.
-    #[must_use]
     pub fn shown(&self, packages: &[&str]) -> String {
         let sudo = self.words.first().is_some_and(|word| Path::new(word).ends_with("sudo"));
         format!("{}apt-get install {}", if sudo { "sudo " } else { "" }, packages.join(" "))

@@ -42,7 +42,6 @@ pub struct BudgetLine {
 }
 
 /// All known figures with their limits. Omits RAM if a part of it is unknown, an unbounded stack, and instructions that were not counted.
-#[must_use]
 pub fn usage_lines(target: &Target, used: &ImageUsage) -> Vec<BudgetLine> {
     let (part, budget) = (target.mcu.part(), &target.budget);
     let limit = |declared: Option<u64>, key: &str, has: u64| match declared {
@@ -107,7 +106,6 @@ fn users(by: &[(String, u64)], whole: u64) -> String {
 }
 
 /// A count with thousands separated.
-#[must_use]
 pub fn group(value: u64) -> String {
     let digits = value.to_string();
     let mut out = String::new();

@@ -34,7 +34,6 @@ pub fn switch_off() {
 }
 
 /// The first problem with the cache in this process, as a warning. A build never fails because of the cache.
-#[must_use]
 pub fn trouble() -> Option<String> {
     TROUBLE.lock().ok()?.clone()
 }
@@ -85,13 +84,11 @@ impl Entry {
 
 impl Cache {
     /// The user's cache; `None` if [`user_cache::builds`] has none.
-    #[must_use]
     pub fn of_user() -> Option<Self> {
         Some(Self { folder: user_cache::builds()?, limit: LIMIT })
     }
 
     /// Its folder, which may not exist yet.
-    #[must_use]
     pub fn folder(&self) -> &Path {
         &self.folder
     }

@@ -5,6 +5,7 @@
 
 use super::error::TargetError;
 use super::thumb::{self, Branch};
+use addr2line::gimli::{EndianSlice, LittleEndian, leb128};
 use object::{Object, ObjectSection, ObjectSymbol, SymbolKind};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -154,34 +155,13 @@ fn stack_sizes(file: &object::File<'_>) -> Result<BTreeMap<u64, u64>, TargetErro
     for section in file.sections().filter(|section| section.name() == Ok(".stack_sizes")) {
         let mut data = section.data().map_err(TargetError::malformed)?;
         while let Some((address, rest)) = data.split_first_chunk::<4>() {
-            let (size, rest) = uleb128(rest).ok_or_else(|| TargetError::MalformedImage {
+            let mut rest = EndianSlice::new(rest, LittleEndian);
+            let size = leb128::read::unsigned(&mut rest).map_err(|_| TargetError::MalformedImage {
                 text: "section .stack_sizes ends within an entry".into(),
             })?;
             sizes.insert(u64::from(u32::from_le_bytes(*address) & !1), size);
-            data = rest;
+            data = rest.slice();
         }
     }
     Ok(sizes)
-}
-
-fn uleb128(data: &[u8]) -> Option<(u64, &[u8])> {
-    let mut value = 0;
-    for (i, byte) in data.iter().enumerate().take(9) {
-        value |= u64::from(byte & 0x7f) << (7 * i);
-        if byte & 0x80 == 0 {
-            return Some((value, &data[i + 1..]));
-        }
-    }
-    None
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn uleb128_reads_several_bytes_and_refuses_a_truncated_one() {
-        assert_eq!(uleb128(&[0xe5, 0x8e, 0x26, 7]), Some((624_485, &[7][..])));
-        assert_eq!(uleb128(&[0x80]), None);
-    }
 }

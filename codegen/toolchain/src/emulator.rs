@@ -114,7 +114,6 @@ impl Emulator {
 }
 
 /// The command that installs it.
-#[must_use]
 pub fn install_command() -> String {
     if cfg!(target_os = "macos") { "brew install qemu".into() } else { format!("apt-get install {PROGRAM} on Debian") }
 }

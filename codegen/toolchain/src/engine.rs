@@ -30,7 +30,6 @@ pub fn find_in(places: &Places) -> Result<PathBuf, TargetError> {
 }
 
 /// The command that installs it.
-#[must_use]
 pub fn install_command() -> String {
     format!("apt-get install {PACKAGE} on Debian; elsewhere set {VARIABLE} to the library of unicorn 2")
 }

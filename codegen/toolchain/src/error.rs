@@ -107,7 +107,6 @@ pub enum TargetError {
 
 impl TargetError {
     /// True if an optional tool is missing or broken: steps that need it can be skipped.
-    #[must_use]
     pub fn is_of_a_tool(&self) -> bool {
         matches!(self, Self::MissingTool { .. } | Self::SetUpFailed { .. } | Self::BrokenTool { .. } | Self::Static)
     }

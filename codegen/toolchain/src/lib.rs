@@ -58,7 +58,6 @@ pub use size::{ASSUMED_MARK, ASSUMED_SEPARATOR, IDENTITY_MARK};
 pub const TRIPLE: &str = "thumbv7em-none-eabihf";
 
 /// SHA-256 in hex.
-#[must_use]
 pub fn sha256(bytes: &[u8]) -> String {
     Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
 }

@@ -23,7 +23,6 @@ pub struct Places {
 
 impl Places {
     /// The places of this machine and user.
-    #[must_use]
     pub fn here() -> Self {
         let folders = |name| std::env::var_os(name).map(|list| std::env::split_paths(&list).collect::<Vec<PathBuf>>());
         let programs = folders(VARIABLE).unwrap_or_else(|| {
@@ -43,7 +42,6 @@ impl Places {
     }
 
     /// The first program of that name.
-    #[must_use]
     pub fn program(&self, name: &str) -> Option<PathBuf> {
         self.all(name).next()
     }
@@ -54,13 +52,11 @@ impl Places {
     }
 
     /// The packages unpacked under this name.
-    #[must_use]
     pub fn unpacked(&self, name: &str) -> Option<PackageFolder> {
         PackageFolder::at(&self.unpacked.as_deref()?.join(name))
     }
 
     /// The folder for unpacked packages.
-    #[must_use]
     pub fn cache(&self) -> Option<&Path> {
         self.unpacked.as_deref()
     }
@@ -74,25 +70,21 @@ pub struct PackageFolder {
 
 impl PackageFolder {
     /// The folder, if it exists.
-    #[must_use]
     pub fn at(root: &Path) -> Option<Self> {
         root.is_dir().then(|| Self { root: root.to_owned() })
     }
 
     /// A program in it.
-    #[must_use]
     pub fn program(&self, name: &str) -> Option<PathBuf> {
         Some(self.programs().join(name)).filter(|file| file.is_file())
     }
 
     /// Folder of its programs.
-    #[must_use]
     pub fn programs(&self) -> PathBuf {
         self.root.join("usr/bin")
     }
 
     /// Folders of its libraries, which Debian names after the architecture.
-    #[must_use]
     pub fn libraries(&self) -> Vec<PathBuf> {
         let mut found = Vec::new();
         for base in ["usr/lib", "lib"] {

@@ -71,7 +71,6 @@ pub struct StageStats {
 
 impl StageStats {
     /// Mean instructions per call; 0 without calls.
-    #[must_use]
     pub fn mean(&self) -> f64 {
         if self.calls == 0 { 0.0 } else { self.sum as f64 / self.calls as f64 }
     }
@@ -79,7 +78,6 @@ impl StageStats {
 
 impl ReplayStats {
     /// The stage with that name.
-    #[must_use]
     pub fn stage(&self, name: &str) -> Option<&StageStats> {
         self.stages.iter().find(|stage| stage.name == name)
     }

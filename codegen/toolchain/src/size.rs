@@ -73,7 +73,6 @@ pub struct Owner {
 
 impl Owner {
     /// Bytes of flash.
-    #[must_use]
     pub fn flash(&self) -> u64 {
         self.code + self.constants
     }
@@ -81,13 +80,11 @@ impl Owner {
 
 impl Size {
     /// Bytes of flash.
-    #[must_use]
     pub fn flash(&self) -> u64 {
         self.sections.iter().filter(|section| section.flash).map(|section| section.bytes).sum()
     }
 
     /// Bytes of statically allocated RAM, without the recorder.
-    #[must_use]
     pub fn ram(&self) -> u64 {
         self.sections
             .iter()
@@ -97,7 +94,6 @@ impl Size {
     }
 
     /// Bytes of the recorder's memory.
-    #[must_use]
     pub fn recorder(&self) -> u64 {
         self.sections.iter().filter(|section| section.name == RECORDER).map(|section| section.bytes).sum()
     }
@@ -152,7 +148,6 @@ pub fn size(elf: &[u8]) -> Result<Size, TargetError> {
 }
 
 /// Whether the image has a tick function that [`checks::check`] knows.
-#[must_use]
 pub fn has_tick(elf: &[u8]) -> bool {
     let Ok(file) = object::File::parse(elf) else { return false };
     file.symbols().any(|symbol| symbol.name().is_ok_and(|name| checks::TICKS.contains(&name)))

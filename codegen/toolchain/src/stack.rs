@@ -35,7 +35,6 @@ pub struct StackBound {
 
 impl StackBound {
     /// True if nothing invalidates the bound: no run can use more than [`StackBound::bytes`].
-    #[must_use]
     pub fn is_complete(&self) -> bool {
         self.recursion.is_empty()
             && self.indirect.is_empty()
@@ -141,7 +140,6 @@ impl Reserve {
     }
 
     /// The larger of `startup` and `running`.
-    #[must_use]
     pub fn needed(&self) -> u64 {
         self.startup.max(self.running)
     }

@@ -52,13 +52,11 @@ pub const NAMES: [&str; TARGETS.len()] = {
 
 impl Target {
     /// The target called `name`.
-    #[must_use]
     pub fn named(name: &str) -> Option<Self> {
         TARGETS.into_iter().find(|target| target.name == name)
     }
 
     /// The board of a part; the emulated machine if there is none.
-    #[must_use]
     pub fn of(mcu: Mcu) -> Self {
         let board = TARGETS.into_iter().find(|target| target.kind == Kind::Board(mcu));
         board.unwrap_or(TARGETS[1])

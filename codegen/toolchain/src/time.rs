@@ -105,7 +105,6 @@ impl Clocks {
     }
 
     /// Memory that holds the code of a tick.
-    #[must_use]
     pub fn memory(&self) -> Memory {
         Memory {
             family: self.family,
@@ -117,7 +116,6 @@ impl Clocks {
     }
 
     /// Time per byte and per frame on the buses of ADC and DACs, per pin read, and extra time per read-back byte, ns.
-    #[must_use]
     pub fn buses(&self) -> [u64; 6] {
         let nanoseconds = |cycles: u64| cycles * 1_000_000_000 / self.core;
         let [byte, frame] = [self.byte, self.frame].map(|work| nanoseconds(self.cycles(work)));
@@ -219,19 +217,16 @@ impl Estimate {
     }
 
     /// The worst tick is longer than the period.
-    #[must_use]
     pub fn too_long(&self) -> bool {
         self.worst > self.period
     }
 
     /// A period with enough margin, in steps of 1 µs.
-    #[must_use]
     pub fn roomy(&self) -> f64 {
         up(self.worst * MARGIN / (1.0 - ROOM))
     }
 
     /// It fits, but leaves less than a fifth of the period.
-    #[must_use]
     pub fn tight(&self) -> bool {
         !self.too_long() && self.worst > (1.0 - ROOM) * self.period
     }

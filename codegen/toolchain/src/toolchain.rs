@@ -142,7 +142,6 @@ fn choose(candidates: &[Candidate], elsewhere: &[PathBuf]) -> Result<Toolchain, 
 }
 
 /// The command that installs one.
-#[must_use]
 pub fn install_command() -> String {
     let debian = if cfg!(target_os = "macos") {
         String::new()
@@ -206,7 +205,6 @@ impl Toolchain {
     /// `cargo build --release` for the target with these rustc flags, to be followed by the caller's arguments.
     ///
     /// Ignores flags from the caller's environment and configuration, since the figures must not depend on them.
-    #[must_use]
     pub fn cargo_build(&self, rustflags: &[&str]) -> Command {
         let mut flags: Vec<String> = rustflags.iter().map(|&flag| flag.to_owned()).collect();
         flags.push("-Zemit-stack-sizes".into());

@@ -50,7 +50,6 @@ pub struct TickShares {
 
 impl TickShares {
     /// The sum.
-    #[must_use]
     pub fn whole(&self) -> Share {
         let all = [self.law, self.recorder, self.wave, self.board];
         all.iter().fold(Share::default(), |sum, share| Share {

@@ -9,13 +9,11 @@ use std::path::{Path, PathBuf};
 pub const VARIABLE: &str = "SPECGEN_CACHE";
 
 /// `specgen` in the system's cache folder: `XDG_CACHE_HOME`, `~/.cache`, on macOS `~/Library/Caches`. `None` without a home folder.
-#[must_use]
 pub fn folder() -> Option<PathBuf> {
     below(&variable, std::env::home_dir().as_deref(), cfg!(target_os = "macos"))
 }
 
 /// The build cache: `builds` in the folder named by [`VARIABLE`], else in [`folder`]. `None` if the variable is empty.
-#[must_use]
 pub fn builds() -> Option<PathBuf> {
     match variable(VARIABLE) {
         Some(given) if given.is_empty() => None,

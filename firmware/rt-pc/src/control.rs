@@ -259,7 +259,6 @@ fn row_of(output: &MachineOutput) -> recorder::Row {
 }
 
 /// The event bit of an integrity check: tables or settings in memory are damaged unless they are `intact`.
-#[must_use]
 pub fn integrity_event(intact: bool) -> u32 {
     if intact { 0 } else { INTEGRITY }
 }

@@ -10,6 +10,7 @@
 //! its cause; the summary shows it.
 
 #[cfg(test)]
+#[path = "bench/tests.rs"]
 mod bench;
 mod capture;
 mod console;
@@ -64,6 +65,16 @@ enum Failure {
     Environment(String),
 }
 
+impl Failure {
+    fn code_and_text(self) -> (u8, String) {
+        match self {
+            Self::Run(text) => (1, text),
+            Self::Usage(text) => (2, text),
+            Self::Environment(text) => (3, text),
+        }
+    }
+}
+
 fn main() -> ExitCode {
     // A record that exceeds the limit stops the machine normally.
     specgen_rt::signals::ignore_file_size();
@@ -72,12 +83,8 @@ fn main() -> ExitCode {
         Invocation::Text(text) => outputs::print(&text).map_err(Failure::Environment),
         Invocation::Run(options) => open(&options),
     });
-    let (code, text) = match done {
-        Ok(()) => return ExitCode::SUCCESS,
-        Err(Failure::Run(text)) => (1, text),
-        Err(Failure::Usage(text)) => (2, text),
-        Err(Failure::Environment(text)) => (3, text),
-    };
+    let Err(failure) = done else { return ExitCode::SUCCESS };
+    let (code, text) = failure.code_and_text();
     eprintln!("error: {text}");
     ExitCode::from(code)
 }
@@ -274,16 +281,9 @@ fn configure(assignments: &[String]) -> Result<Config, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use bench::{Bench, Call};
+    use bench::{Bench, Call, options};
     use std::path::Path;
     use std::time::{Duration, Instant};
-
-    fn options(line: &str) -> Options {
-        match options::parse(std::iter::once("rt-pc").chain(line.split_whitespace()).map(Into::into)) {
-            Ok(Invocation::Run(options)) => *options,
-            other => panic!("{line}: {other:?}"),
-        }
-    }
 
     /// A run on a made-up machine, to which something happens at the beginning of every tick: why it failed, and how long it took.
     fn run_on(line: &str, act: impl FnMut(&mut Bench) + Send + 'static) -> (Result<(), (u8, String)>, Duration, Bench) {
@@ -297,11 +297,7 @@ mod tests {
     ) -> (Result<(), (u8, String)>, Duration, Bench) {
         let mut bench = Bench::new(handover::rings(false).1, act);
         let start = Instant::now();
-        let done = run(&options(line), &mut bench, signal).map_err(|failure| match failure {
-            Failure::Run(text) => (1, text),
-            Failure::Usage(text) => (2, text),
-            Failure::Environment(text) => (3, text),
-        });
+        let done = run(&options(line), &mut bench, signal).map_err(Failure::code_and_text);
         (done, start.elapsed(), bench)
     }
 
@@ -419,13 +415,8 @@ mod tests {
             #[cfg(not(feature = "comedi"))]
             ("--comedi /dev/comedi0", 2, "--features comedi"),
         ] {
-            let (found, text) = match open(&options(line)) {
-                Err(Failure::Run(text)) => (1, text),
-                Err(Failure::Usage(text)) => (2, text),
-                Err(Failure::Environment(text)) => (3, text),
-                Ok(()) => panic!("{line}"),
-            };
-            assert!(found == code && text.contains(words), "{line}: {text}");
+            let done = open(&options(line)).map_err(Failure::code_and_text);
+            assert!(matches!(&done, Err((found, text)) if *found == code && text.contains(words)), "{line}: {done:?}");
         }
     }
 }

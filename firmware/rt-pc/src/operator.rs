@@ -126,7 +126,6 @@ pub struct Arbiter {
 
 impl Arbiter {
     /// Without a plan. If a plan fails, the loop continues if it is `attended`, otherwise it ends.
-    #[must_use]
     pub fn new(attended: bool, timeout: Timeout) -> Self {
         Self {
             command: [0; COMMAND_WORDS],
@@ -167,7 +166,6 @@ impl Arbiter {
     }
 
     /// Whether the loop may end now.
-    #[must_use]
     pub fn is_over(&self) -> bool {
         self.step == Step::Over
     }
@@ -222,13 +220,11 @@ impl Arbiter {
     }
 
     /// Whether it only waits for the end.
-    #[must_use]
     pub fn is_ending(&self) -> bool {
         matches!(self.step, Step::GoingDown | Step::Over)
     }
 
     /// Whether a host is in control: it is not silent, and has sent a command recently.
-    #[must_use]
     pub fn host_in_control(&self, now: u64) -> bool {
         match self.owner {
             Owner::Here => false,
@@ -245,19 +241,16 @@ impl Arbiter {
     }
 
     /// Whether this host sent the last command.
-    #[must_use]
     pub fn is_owner(&self, host: HostId) -> bool {
         matches!(self.owner, Owner::Host { id, .. } if id == host)
     }
 
     /// Whether this host has lost control.
-    #[must_use]
     pub fn is_evicted(&self, host: HostId) -> bool {
         self.evicted == Some(host)
     }
 
     /// Changes with every request of the host in control; 0 if no host's silence matters.
-    #[must_use]
     pub fn heartbeat(&self) -> u64 {
         if self.is_host_owned() { self.requests } else { 0 }
     }
@@ -292,7 +285,6 @@ impl Arbiter {
     }
 
     /// Whether no other host is in control.
-    #[must_use]
     pub fn may_take_control(&self, host: HostId, now: u64) -> bool {
         self.is_owner(host) || !self.host_in_control(now)
     }
@@ -341,7 +333,6 @@ impl Arbiter {
     }
 
     /// The present command.
-    #[must_use]
     pub fn command(&self) -> &Command {
         &self.command
     }
@@ -403,22 +394,14 @@ mod tests {
     const A: HostId = HostId(1);
     const B: HostId = HostId(2);
 
+    const TIMEOUT: Timeout = Timeout { silence: SILENCE, idle: IDLE };
+
     fn said(phase: Phase, on: bool) -> SupervisorReport {
-        SupervisorReport {
-            phase,
-            cause: Cause::None,
-            finding: Finding::None,
-            on,
-            status: 0,
-            tick: 7,
-            commands: 0,
-            waving: false,
-            late: 0,
-        }
+        SupervisorReport { on, ..crate::bench::said(phase) }
     }
 
     fn operator() -> Arbiter {
-        Arbiter::new(false, Timeout { silence: SILENCE, idle: IDLE })
+        Arbiter::new(false, TIMEOUT)
     }
 
     #[test]
@@ -459,7 +442,7 @@ mod tests {
 
     #[test]
     fn an_attended_loop_does_not_end_at_a_fault() {
-        let mut operator = Arbiter::new(true, Timeout { silence: SILENCE, idle: IDLE });
+        let mut operator = Arbiter::new(true, TIMEOUT);
         operator.plan(&[], 0).unwrap();
         operator.update(&said(Phase::Faulted, false), 1);
         operator.update(&said(Phase::Faulted, false), 2);
@@ -565,8 +548,6 @@ mod tests {
         assert!(operator.is_evicted(A) && operator.is_owner(B));
     }
 
-    const ATTENDED: Timeout = Timeout { silence: SILENCE, idle: IDLE };
-
     #[test]
     fn a_step_that_is_not_answered_is_given_up_after_its_time_and_not_before() {
         for (phase, first, limit, asked) in [
@@ -629,7 +610,7 @@ mod tests {
     #[test]
     fn what_a_host_that_has_gone_asked_for_is_not_asked_for_on_behalf_of_the_next() {
         let connected = |owner: Option<HostId>, now: u64| {
-            let mut operator = Arbiter::new(true, ATTENDED);
+            let mut operator = Arbiter::new(true, TIMEOUT);
             if let Some(owner) = owner {
                 operator.take_for_host(owner, 0).unwrap();
                 operator.ask_by_link(Request::Run, owner);
@@ -644,7 +625,7 @@ mod tests {
         assert_eq!(connected(Some(A), SILENCE + 1), Some(Request::None));
         assert_eq!(connected(Some(B), 0), Some(Request::None), "it reconnects by itself");
         assert_eq!(connected(None, SILENCE + 1), None, "a plan goes on");
-        let mut operator = Arbiter::new(true, ATTENDED);
+        let mut operator = Arbiter::new(true, TIMEOUT);
         operator.take_for_host(A, 0).unwrap();
         operator.ramp_down(1);
         operator.take_pending();

@@ -228,10 +228,7 @@ fn range(parser: &mut lexopt::Parser, name: &str) -> Result<[f64; 2], lexopt::Er
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn parsed(line: &str) -> Result<Invocation, String> {
-        parse(std::iter::once("rt-pc").chain(line.split_whitespace()).map(Into::into))
-    }
+    use crate::bench::{options as run, parsed};
 
     #[test]
     fn options_are_read_and_nonsense_is_refused() {
@@ -258,13 +255,6 @@ mod tests {
         assert!(matches!(parsed("--help"), Ok(Invocation::Text(text)) if text == HELP));
         let wide: Vec<&str> = HELP.lines().filter(|line| line.chars().count() > 80).collect();
         assert!(wide.is_empty(), "{wide:#?}");
-    }
-
-    fn run(line: &str) -> Options {
-        match parsed(line) {
-            Ok(Invocation::Run(options)) => *options,
-            other => panic!("{line}: {other:?}"),
-        }
     }
 
     #[test]

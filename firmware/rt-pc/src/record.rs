@@ -137,18 +137,6 @@ mod tests {
     use controller::supervised::{MACHINE_INPUT_WORDS, MachineInput};
     use rtrb::RingBuffer;
 
-    /// Blocks of a file: rows, and words of each.
-    fn blocks(bytes: &[u8]) -> Vec<[u64; 2]> {
-        let word = |at: usize| u64::from_le_bytes(bytes[at..at + 8].try_into().unwrap());
-        let mut at = 16 + (word(8) >> 32) as usize + 8;
-        let mut blocks = Vec::new();
-        while at < bytes.len() {
-            blocks.push([word(at + 16), word(at + 8)]);
-            at += (word(at + 8) as usize + 1) * 8;
-        }
-        blocks
-    }
-
     #[test]
     fn a_block_has_room_for_rows_in_which_every_word_is_another_one() {
         let path = std::env::temp_dir().join(format!("rt-pc-longest-{}", std::process::id()));
@@ -164,9 +152,9 @@ mod tests {
             }
         }
         assert_eq!(writer.finish().unwrap(), 2 * u64::from(SNAPSHOT_EVERY));
-        let blocks = blocks(&std::fs::read(&path).unwrap());
+        let blocks = crate::bench::blocks(&std::fs::read(&path).unwrap());
         std::fs::remove_file(&path).unwrap();
-        assert_eq!(blocks.iter().map(|block| block[0]).collect::<Vec<_>>(), [u64::from(SNAPSHOT_EVERY); 2]);
+        assert_eq!(blocks.iter().map(|block| block[2]).collect::<Vec<_>>(), [u64::from(SNAPSHOT_EVERY); 2]);
         // No more memory than that takes.
         assert!(
             blocks.iter().all(|block| block[1] <= BLOCK as u64 && block[1] > BLOCK as u64 / 2),

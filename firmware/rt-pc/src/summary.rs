@@ -25,7 +25,6 @@ pub struct Summary<'a> {
 
 impl Summary<'_> {
     /// Reason why the run failed, if it did.
-    #[must_use]
     pub fn failure(&self) -> Option<String> {
         let outcome = self.outcome;
         if !self.account.balances() {
@@ -145,13 +144,11 @@ impl Summary<'_> {
         })
     }
 
-    #[must_use]
     pub fn to_text(&self) -> String {
         self.facts().into_iter().map(|(.., lines)| lines).collect()
     }
 
     /// JSON for programs, a line for each name.
-    #[must_use]
     pub fn to_json(&self) -> String {
         let lines: Vec<String> =
             self.facts().into_iter().map(|(name, value, _)| format!("  {}: {value}", Json::from(name))).collect();

@@ -20,21 +20,18 @@ pub fn place(name: &str) -> Result<usize, String> {
 }
 
 /// A number as a word of this controller's arithmetic, an f32 with zeros above.
-#[must_use]
 #[allow(clippy::useless_conversion)] // Of the bits of an f64; those of an f32 have 32.
 pub fn word(value: Real) -> u64 {
     u64::from(value.to_bits())
 }
 
 /// The word of `value` in the input word `index`: the words of the commands are integers, all others numbers.
-#[must_use]
 pub fn word_of(index: usize, value: f64) -> Option<u64> {
     let name = MACHINE_INPUT_NAMES.get(index)?;
     if name.contains('[') { Some(word(value as Real)) } else { integer(value) }
 }
 
 /// The word of `value` in the setting at this index of `CONFIG_NAMES`.
-#[must_use]
 pub fn setting(place: usize, value: f64) -> Option<u64> {
     match PermittedRange::of(&permitted::SETTINGS, place)? {
         PermittedRange::Whole(..) => integer(value),
@@ -43,7 +40,6 @@ pub fn setting(place: usize, value: f64) -> Option<u64> {
 }
 
 /// The permitted range of the setting at this index, as text.
-#[must_use]
 pub fn range(place: usize) -> String {
     match PermittedRange::of(&permitted::SETTINGS, place) {
         Some(PermittedRange::Whole(least, most)) => {
@@ -60,7 +56,6 @@ fn integer(value: f64) -> Option<u64> {
 }
 
 /// Control period, ns, from the controller's description.
-#[must_use]
 pub fn period() -> Option<u64> {
     let text = controller::DESCRIPTION.lines().find_map(|line| line.strip_prefix("period="))?;
     let seconds: f64 = text.parse().ok()?;

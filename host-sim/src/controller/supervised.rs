@@ -32,7 +32,6 @@ pub struct MachineWord {
 
 impl MachineWord {
     /// phase | cause << 8 | amplifier on << 16 | finding << 17.
-    #[must_use]
     pub fn of(word: u64) -> Self {
         let [phase, cause, on, ..] = word.to_le_bytes();
         Self { phase, cause, amplifier_on: on & 1 == 1, finding: (word as u32) >> 17 }
@@ -55,7 +54,6 @@ impl fmt::Display for MachineWord {
 impl MachineWord {
     /// The same with the finding of the wiring check or the fallback stage, and its alternatives: `alike` are sets of
     /// equivalent faults, as words of [`Finding`].
-    #[must_use]
     pub fn among<S: AsRef<[u32]>>(&self, alike: &[S]) -> String {
         let Self { phase, cause, finding, .. } = *self;
         let of =
@@ -79,14 +77,12 @@ pub struct Supervised {
 
 impl Supervised {
     /// A controller under its supervisor, disarmed.
-    #[must_use]
     pub fn new(mut controller: Controller) -> Self {
         controller.engine.reset_machine();
         Self { controller }
     }
 
     /// The inner controller: its description and configuration. Its own state is not that of the machine.
-    #[must_use]
     pub fn controller(&self) -> &Controller {
         &self.controller
     }
@@ -100,7 +96,6 @@ impl Supervised {
     }
 
     /// Names of the input words of [`Supervised::step`].
-    #[must_use]
     pub fn input_names(&self) -> Vec<String> {
         let mut names = self.controller.description.input_names.clone();
         names.extend(["request", "events"].map(str::to_owned));
@@ -108,7 +103,6 @@ impl Supervised {
     }
 
     /// Names of the output words of [`Supervised::step`].
-    #[must_use]
     pub fn output_names(&self) -> Vec<String> {
         let mut names = self.controller.description.output_names.clone();
         names.extend(["supervisor", "conditions"].map(str::to_owned));
@@ -133,13 +127,11 @@ impl Supervised {
     }
 
     /// Digest of the machine.
-    #[must_use]
     pub fn digest(&self) -> u64 {
         self.controller.engine.machine_digest()
     }
 
     /// Another machine in the same state, for several continuations from here.
-    #[must_use]
     pub fn fork(&self) -> Self {
         Self { controller: self.controller.fork() }
     }

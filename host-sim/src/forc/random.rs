@@ -40,7 +40,6 @@ impl RandomDrive {
     }
 
     /// The drive of every row, V.
-    #[must_use]
     pub fn drive(&self) -> Vec<f64> {
         let mut random = ChaCha8Rng::seed_from_u64(self.seed);
         let spacing = libm::log(BAND[1] / BAND[0]) / f64::from(LINES - 1);

@@ -63,7 +63,6 @@ pub struct BoucWen {
 
 impl BoucWen {
     /// A leg as built, from checked parameters.
-    #[must_use]
     pub fn new(of: BoucWenParameters) -> Self {
         Self { of, voltage: 0.0, lost: 0.0 }
     }

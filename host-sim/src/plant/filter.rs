@@ -16,7 +16,6 @@ pub struct SmoothLag {
 
 impl SmoothLag {
     /// `time_constant` τ in s, > 0.
-    #[must_use]
     pub fn new(time_constant: f64) -> Self {
         Self { time_constant, step: 0.0, values: [0.0; 2], rates: [0.0; 2], output: 0.0 }
     }
@@ -51,13 +50,11 @@ impl SmoothLag {
     }
 
     /// Output now.
-    #[must_use]
     pub fn output(&self) -> f64 {
         self.output
     }
 
     /// Rate of the output (1/s) at this input.
-    #[must_use]
     pub fn rate(&self, input: f64) -> f64 {
         (input - self.output) / self.time_constant
     }
@@ -87,7 +84,6 @@ pub struct Resonance {
 
 impl Resonance {
     /// `frequency` fn in Hz (> 0), `damping` ζ in [0, 1).
-    #[must_use]
     pub fn new(frequency: f64, damping: f64) -> Self {
         Self {
             natural: core::f64::consts::TAU * frequency,
@@ -111,7 +107,6 @@ impl Resonance {
     }
 
     /// Present position, in the unit of the input, and its rate, per s.
-    #[must_use]
     pub fn motion(&self) -> [f64; 2] {
         [self.position, self.velocity]
     }

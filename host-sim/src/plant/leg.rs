@@ -40,7 +40,6 @@ pub struct LegPlant {
 
 impl LegPlant {
     /// A leg as built, from checked parameters.
-    #[must_use]
     pub fn new(parameters: &LegParameters) -> Self {
         let p = parameters;
         Self {
@@ -85,13 +84,11 @@ impl LegPlant {
     }
 
     /// Present displacement, m, as last returned by [`LegPlant::hold`].
-    #[must_use]
     pub fn displacement(&self) -> f64 {
         self.structure.motion()[0] * 1e-6
     }
 
     /// Noise-free gauge signal, m.
-    #[must_use]
     pub fn seen(&self) -> f64 {
         self.gauge.as_ref().map_or_else(|| self.displacement(), |gauge| gauge.output() * 1e-6)
     }

@@ -113,14 +113,12 @@ pub const SHIPPED: [(&str, &str); 2] =
 
 impl LegParameters {
     /// The reference leg, whose hysteresis is plays.
-    #[must_use]
     pub fn reference() -> Self {
         let [(name, text), _] = SHIPPED;
         Self::known(name, text)
     }
 
     /// The shipped leg with Bouc-Wen hysteresis and equal creep over five decades of time.
-    #[must_use]
     pub fn bouc_wen() -> Self {
         let [_, (name, text)] = SHIPPED;
         Self::known(name, text)

@@ -14,25 +14,21 @@ pub struct WorkPart {
 
 impl WorkPart {
     /// Diamond tip 40 mm above P_C on a part of `stiffness` k (N/m): K = diag(0.8, 0.8, 1) k, in both directions.
-    #[must_use]
     pub const fn of_stiffness(stiffness: f64) -> Self {
         Self { stiffness: [0.8 * stiffness, 0.8 * stiffness, stiffness], tip: [0.0, 0.0, 0.04] }
     }
 
     /// Glass, k = 3 MN/m: order of magnitude of a Rockwell tip at 1 to 10 µm of indentation.
-    #[must_use]
     pub const fn glass() -> Self {
         Self::of_stiffness(3e6)
     }
 
     /// Aluminium, k = 1.2 MN/m.
-    #[must_use]
     pub const fn aluminium() -> Self {
         Self::of_stiffness(1.2e6)
     }
 
     /// Stiffness at a pose in coordinates h: Jᵀ K J of the tip.
-    #[must_use]
     pub fn stiffness_matrix(&self, pose: &Six) -> Matrix6 {
         let arm = apply(&rotation(angles(pose)), &self.tip);
         congruent(&point_jacobian(arm, &rate_matrix(angles(pose))), &self.stiffness)
@@ -60,7 +56,6 @@ pub struct Wrench {
 
 impl Wrench {
     /// The generalised force in coordinates h of a wrench on the platform: [F, Tᵀ τ].
-    #[must_use]
     pub fn generalised(&self, rates: &Matrix3) -> Six {
         let mut out = [self.force[0], self.force[1], self.force[2], 0.0, 0.0, 0.0];
         for k in 0..3 {
@@ -72,14 +67,12 @@ impl Wrench {
     }
 
     /// Both together.
-    #[must_use]
     pub fn and(&self, other: &Self) -> Self {
         let sum = |a: &Three, b: &Three| [0, 1, 2].map(|k| a[k] + b[k]);
         Self { force: sum(&self.force, &other.force), torque: sum(&self.torque, &other.torque) }
     }
 
     /// Force, then torque.
-    #[must_use]
     pub fn numbers(&self) -> Six {
         let (f, t) = (self.force, self.torque);
         [f[0], f[1], f[2], t[0], t[1], t[2]]
@@ -88,7 +81,6 @@ impl Wrench {
 
 impl Contact {
     /// Touches `part` at `pose` without force.
-    #[must_use]
     pub fn at(part: WorkPart, pose: &Six) -> Self {
         Self { part, pose: *pose, arm: apply(&rotation(angles(pose)), &part.tip) }
     }
@@ -100,7 +92,6 @@ impl Contact {
     }
 
     /// (5): force of the part on the platform.
-    #[must_use]
     pub fn wrench(&self, pose: &Six) -> Wrench {
         let deflection = self.deflection(pose);
         let force = [0, 1, 2].map(|k| -self.part.stiffness[k] * deflection[k]);

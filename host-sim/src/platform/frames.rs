@@ -12,14 +12,12 @@ pub struct UserFrames {
 
 impl UserFrames {
     /// Work axes rotated by `angles` (rad, R = Rz Ry Rx) from those of {B}; the tool point in {P}, m.
-    #[must_use]
     pub fn new(angles: &Three, tool: Three) -> Self {
         Self { axes: rotation(*angles), tool }
     }
 
     /// Pose of P_C, without the bias, at which the tool point has moved by the first three numbers along the work axes
     /// and the platform has rotated about them by the last three.
-    #[must_use]
     pub fn pose(&self, user: &Six) -> Six {
         if *self == Self::new(&[0.0; 3], [0.0; 3]) {
             return *user;

@@ -36,7 +36,6 @@ impl Probe {
     }
 
     /// Displacement of the target along the line since rest, m, at `pose` from rest; `height` is z of P_C at rest, m.
-    #[must_use]
     pub fn reading(&self, height: f64, pose: &Six) -> f64 {
         self.distance(height, pose) - self.distance(height, &[0.0; 6])
     }
@@ -99,7 +98,6 @@ pub enum GaugeSignal {
 
 impl GaugeSignal {
     /// Signal of gauge `index` at `displacement` (m).
-    #[must_use]
     pub fn of(&self, index: usize, displacement: f64) -> f64 {
         match self {
             Self::Metres => displacement,

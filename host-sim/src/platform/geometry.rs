@@ -45,19 +45,16 @@ pub(super) fn attitude(angles: Three) -> (Matrix3, Matrix3) {
 }
 
 /// R of the angles [θx, θy, θz], rad.
-#[must_use]
 pub fn rotation(angles: Three) -> Matrix3 {
     attitude(angles).0
 }
 
 /// T(θ) of ω = T(θ) θ̇, ω in {B}: the axes about which the three angles turn, as columns.
-#[must_use]
 pub fn rate_matrix(angles: Three) -> Matrix3 {
     attitude(angles).1
 }
 
 /// ∂(P_C + R a)/∂h of a point fixed to the platform, with `arm` = R a in {B}, and T(θ).
-#[must_use]
 pub fn point_jacobian(arm: Three, rates: &Matrix3) -> [Six; 3] {
     let mut out = [[0.0; 6]; 3];
     for k in 0..3 {
@@ -71,14 +68,12 @@ pub fn point_jacobian(arm: Three, rates: &Matrix3) -> [Six; 3] {
 }
 
 /// The angles of a pose.
-#[must_use]
 pub fn angles(pose: &Six) -> Three {
     [pose[3], pose[4], pose[5]]
 }
 
 impl Geometry {
     /// The symmetric platform of (1) and (2): joints on two circles, in pairs `base_angle` and `platform_angle` (rad) apart.
-    #[must_use]
     pub fn hexagonal(
         [base_radius, platform_radius]: [f64; 2],
         [base_angle, platform_angle]: [f64; 2],
@@ -100,14 +95,12 @@ impl Geometry {
     }
 
     /// From B_i to P_i at rest, in {B}, m.
-    #[must_use]
     pub fn rest_leg(&self, leg: usize) -> Three {
         let (b, p) = (self.base_joints[leg], self.platform_joints[leg]);
         [p[0] - b[0], p[1] - b[1], self.height + p[2] - b[2]]
     }
 
     /// Leg lengths at rest, m.
-    #[must_use]
     pub fn rest_lengths(&self) -> Six {
         std::array::from_fn(|leg| {
             let r = self.rest_leg(leg);
@@ -116,7 +109,6 @@ impl Geometry {
     }
 
     /// Leg vectors r_i, from B_i to P_i in {B}, and the arms R P_i, m.
-    #[must_use]
     pub fn legs(&self, pose: &Six) -> [(Three, Three); 6] {
         let r = rotation(angles(pose));
         std::array::from_fn(|leg| {
@@ -127,19 +119,16 @@ impl Geometry {
     }
 
     /// Δl: extension of each leg from rest, m, exact apart from rounding at 1e-17 m.
-    #[must_use]
     pub fn extensions(&self, pose: &Six) -> Six {
         self.extensions_and_jacobian(pose).0
     }
 
     /// J = ∂l/∂h, m/m and m/rad.
-    #[must_use]
     pub fn jacobian(&self, pose: &Six) -> Matrix6 {
         self.extensions_and_jacobian(pose).1
     }
 
     /// Δl and J together.
-    #[must_use]
     pub fn extensions_and_jacobian(&self, pose: &Six) -> (Six, Matrix6) {
         self.extensions_and_jacobian_from(&self.rest_lengths(), pose)
     }

@@ -123,7 +123,6 @@ pub struct Imperfections {
 
 impl Imperfections {
     /// Whether there are none.
-    #[must_use]
     pub fn is_none(&self) -> bool {
         *self == Self::default()
     }

@@ -64,7 +64,6 @@ impl LegBodies {
 
 impl Masses {
     /// M(h), kg, kg m, kg m²: T = ½ ḣᵀ M ḣ.
-    #[must_use]
     pub fn mass_matrix(&self, geometry: &Geometry, pose: &Six) -> Matrix6 {
         let turn = rotation(angles(pose));
         let rates = rate_matrix(angles(pose));
@@ -89,7 +88,6 @@ impl Masses {
     }
 
     /// G(h) = ∂V/∂h of the weight, N and N m: the generalised force that carries platform and legs.
-    #[must_use]
     pub fn weight(&self, geometry: &Geometry, pose: &Six) -> Six {
         let turn = rotation(angles(pose));
         let rates = rate_matrix(angles(pose));

@@ -102,7 +102,6 @@ pub const REFERENCE_PLATFORM: &str = include_str!("../../plants/reference-platfo
 
 impl PlatformParameters {
     /// The reference platform.
-    #[must_use]
     pub fn reference() -> Self {
         match Self::from_json(REFERENCE_PLATFORM, "reference-platform.json") {
             Ok(parameters) => parameters,
@@ -120,7 +119,6 @@ impl PlatformParameters {
     }
 
     /// Joints.
-    #[must_use]
     pub fn geometry(&self) -> Geometry {
         if let Some(Joints { base, platform }) = self.joints {
             return Geometry { base_joints: base, platform_joints: platform, height: self.height_m };
@@ -134,7 +132,6 @@ impl PlatformParameters {
     }
 
     /// Masses.
-    #[must_use]
     pub fn masses(&self) -> Masses {
         Masses {
             platform: self.platform_mass_kg,

@@ -41,7 +41,6 @@ pub struct PlatformPlant {
 
 impl PlatformPlant {
     /// A plant as built: legs never driven, at rest.
-    #[must_use]
     pub fn new(specimen: &Specimen) -> Self {
         let nominal = &specimen.nominal;
         let lag = specimen.legs[0].gauge_lag_s;
@@ -207,7 +206,6 @@ impl PlatformPlant {
     }
 
     /// The pose that the gauges see: h with their lag. A lag on each reading instead differs by less than 1e-14 m.
-    #[must_use]
     pub fn seen(&self) -> Six {
         self.seen_motion()[0]
     }
@@ -223,31 +221,26 @@ impl PlatformPlant {
     }
 
     /// h, from rest, m and rad.
-    #[must_use]
     pub fn pose(&self) -> Six {
         self.long.as_ref().map_or_else(|| self.structure.pose(), |long| long.pose())
     }
 
     /// ḣ, m/s and rad/s.
-    #[must_use]
     pub fn rate(&self) -> Six {
         self.long.as_ref().map_or_else(|| self.structure.rate(), |long| long.rate())
     }
 
     /// d_i: displacement of each leg without load since rest, m.
-    #[must_use]
     pub fn free_displacements(&self) -> Six {
         std::array::from_fn(|leg| self.displacement[leg])
     }
 
     /// Voltages of the stacks, V.
-    #[must_use]
     pub fn stack_voltages(&self) -> Six {
         std::array::from_fn(|leg| self.actuators.voltages()[leg])
     }
 
     /// The structure; while long steps are in use, its state when they began.
-    #[must_use]
     pub fn structure(&self) -> &Structure {
         &self.structure
     }
@@ -273,7 +266,6 @@ impl PlatformPlant {
     }
 
     /// Total wrench of work part and disturbance on the platform.
-    #[must_use]
     pub fn wrench(&self) -> Wrench {
         let disturbance = self.structure.disturbance();
         self.structure.contact().map_or(disturbance, |contact| contact.wrench(&self.pose()).and(&disturbance))

@@ -40,7 +40,6 @@ impl Noise {
     pub const NONE: Self = Self { channels: NoiseParameters::NONE, force: [0.0; 6] };
 
     /// That of the parameter files.
-    #[must_use]
     pub fn of(specimen: &Specimen) -> Self {
         Self { channels: specimen.legs[0].noise, force: specimen.nominal.force_noise }
     }
@@ -86,7 +85,6 @@ pub struct PlatformRig {
 
 impl PlatformRig {
     /// A plant as built, with noise from one seed. Gauges give metres.
-    #[must_use]
     pub fn new(specimen: &Specimen, noise: &Noise, seed: u64) -> Self {
         let nominal = &specimen.nominal;
         Self {
@@ -132,14 +130,12 @@ impl PlatformRig {
     }
 
     /// Period of the mains in the gauges, s; none without mains.
-    #[must_use]
     pub fn mains_period(&self) -> Option<f64> {
         let mains = self.imperfections.as_ref()?.mains.iter().find(|one| one.amplitude_m > 0.0)?;
         (mains.frequency_hz > 0.0).then(|| 1.0 / mains.frequency_hz)
     }
 
     /// The plant.
-    #[must_use]
     pub fn plant(&self) -> &PlatformPlant {
         &self.plant
     }

@@ -33,16 +33,6 @@ pub const FREE_MODES: [(&str, u32); 3] = [ControlMode::WORDS[4], ControlMode::WO
 /// The modes of Table 9.
 pub const MACHINING_MODES: [(&str, u32); 2] = [ControlMode::WORDS[0], ControlMode::WORDS[6]];
 
-/// A trajectory with its name in tables.
-pub struct NamedTrajectory<'a> {
-    /// Name: `case-1` and `case-2` are the paper's.
-    pub name: &'a str,
-    /// Operating frequency, Hz.
-    pub frequency: f64,
-    /// The motion.
-    pub trajectory: &'a dyn PoseTrajectory,
-}
-
 /// One plant, prepared once; every run starts from the same state.
 #[derive(Debug, Clone)]
 pub struct PlatformScenario {
@@ -53,7 +43,6 @@ pub struct PlatformScenario {
 
 impl PlatformScenario {
     /// A plant, pre-cycled, settled and zeroed by the parameters of its first leg, with noise from `seed`.
-    #[must_use]
     pub fn new(specimen: &Specimen, noise: &Noise, seed: u64, options: RunOptions) -> Self {
         let mut prepared = PlatformRig::new(specimen, noise, seed);
         let nominal = &specimen.nominal;
@@ -62,7 +51,6 @@ impl PlatformScenario {
     }
 
     /// The prepared rig.
-    #[must_use]
     pub fn rig(&self) -> &PlatformRig {
         &self.prepared
     }
@@ -111,8 +99,9 @@ impl PlatformScenario {
         self.prepared.clone().run(controller, trajectory, &options)
     }
 
-    /// Tables 5 to 8: every mode on every trajectory. The controller keeps the last mode; other configuration words, except
-    /// those of [`select_at_equal_gains`], are the spec's.
+    /// Tables 5 to 8: every mode on a trajectory, under the name and the operating frequency (Hz) that the tables give it: `case-1`
+    /// and `case-2` are the paper's. The controller keeps the last mode; other configuration words, except those of
+    /// [`select_at_equal_gains`], are the spec's.
     ///
     /// # Errors
     /// As [`PlatformRig::run`], and if the controller has no `mode` word.
@@ -120,15 +109,14 @@ impl PlatformScenario {
         &self,
         controller: &mut dyn TickController,
         modes: &[(&str, u32)],
-        trajectories: &[NamedTrajectory],
+        (name, frequency): (&str, f64),
+        trajectory: &dyn PoseTrajectory,
     ) -> Result<PoseTable, RunError> {
         let mut table = PoseTable::default();
-        for NamedTrajectory { name, frequency, trajectory } in trajectories {
-            for &(mode, word) in modes {
-                select_at_equal_gains(controller, word)?;
-                let run = self.run(controller, *trajectory)?;
-                table.rows.push(PoseRow::of(name, mode, *frequency, run.scored()?));
-            }
+        for &(mode, word) in modes {
+            select_at_equal_gains(controller, word)?;
+            let run = self.run(controller, trajectory)?;
+            table.rows.push(PoseRow::of(name, mode, frequency, run.scored()?));
         }
         Ok(table)
     }

@@ -16,7 +16,6 @@ pub struct ForceSensor {
 
 impl ForceSensor {
     /// `noise` is N and N m rms per reading, `range` the largest reading of each component, N and N m.
-    #[must_use]
     pub fn new(noise: &Six, range: &Six, seed: u64) -> Self {
         Self { noise: std::array::from_fn(|k| Gaussian::new(noise[k], seed, FIRST_STREAM + k as u64)), range: *range }
     }

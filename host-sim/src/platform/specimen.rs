@@ -31,7 +31,6 @@ pub struct Specimen {
 
 impl Specimen {
     /// Six equal legs, no tolerances.
-    #[must_use]
     pub fn ideal(nominal: &PlatformParameters, leg: &LegParameters) -> Self {
         Self {
             nominal: nominal.clone(),
@@ -42,7 +41,6 @@ impl Specimen {
 
     /// Gain, asymmetry, width of hysteresis, creep and amplifier lag of every leg within ±10 %, independently; its
     /// stiffness within ±5 %.
-    #[must_use]
     pub fn within_tolerances(nominal: &PlatformParameters, leg: &LegParameters, seed: u64) -> Self {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         rng.set_stream(TOLERANCE_STREAM);
@@ -62,13 +60,11 @@ impl Specimen {
     }
 
     /// The reference machine: the shipped parameter files, tolerances of seed 1.
-    #[must_use]
     pub fn reference() -> Self {
         Self::within_tolerances(&PlatformParameters::reference(), &LegParameters::reference(), 1)
     }
 
     /// Its structure: c_i = β k_i with β = 2ζ/ω_1 of the nominal platform.
-    #[must_use]
     pub fn structure(&self) -> StructureParameters {
         let mut parameters = StructureParameters {
             geometry: self.nominal.geometry(),

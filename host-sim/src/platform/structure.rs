@@ -46,13 +46,11 @@ pub struct StructureParameters {
 
 impl StructureParameters {
     /// M at rest.
-    #[must_use]
     pub fn mass_matrix(&self) -> Matrix6 {
         self.masses.mass_matrix(&self.geometry, &[0.0; 6])
     }
 
     /// K = Jᵀ diag(k) J at rest, in coordinates h, and that of the joints.
-    #[must_use]
     pub fn stiffness_matrix(&self) -> Matrix6 {
         let axial = congruent(&self.geometry.jacobian(&[0.0; 6]), &self.stiffness);
         self.joint_stiffness().map_or(axial, |joints| sum(&axial, &joints))
@@ -77,7 +75,6 @@ impl StructureParameters {
     }
 
     /// Undamped modes on the legs alone: angular frequencies in rising order, rad/s, and shapes as columns.
-    #[must_use]
     pub fn modes(&self) -> (Six, Matrix6) {
         let (squares, shapes) = generalised_eigen(&self.stiffness_matrix(), &self.mass_matrix());
         (squares.map(libm::sqrt), shapes)
@@ -195,7 +192,6 @@ pub struct Structure {
 
 impl Structure {
     /// At rest, without contact; `step` in s is the length of the steps that follow.
-    #[must_use]
     pub fn new(parameters: StructureParameters, step: f64) -> Self {
         let mass = parameters.mass_matrix();
         let jacobian = parameters.geometry.jacobian(&[0.0; 6]);
@@ -229,7 +225,6 @@ impl Structure {
     }
 
     /// What it is made of.
-    #[must_use]
     pub fn parameters(&self) -> &StructureParameters {
         &self.parameters
     }
@@ -240,7 +235,6 @@ impl Structure {
     }
 
     /// Length of a step, s.
-    #[must_use]
     pub fn step(&self) -> f64 {
         self.step
     }
@@ -279,7 +273,6 @@ impl Structure {
     }
 
     /// The part in touch.
-    #[must_use]
     pub fn contact(&self) -> Option<&Contact> {
         self.contact.as_ref()
     }
@@ -300,7 +293,6 @@ impl Structure {
     }
 
     /// The wrench that was put on it.
-    #[must_use]
     pub fn disturbance(&self) -> Wrench {
         self.disturbance.unwrap_or_default()
     }
@@ -311,13 +303,11 @@ impl Structure {
     }
 
     /// h, m and rad.
-    #[must_use]
     pub fn pose(&self) -> Six {
         std::array::from_fn(|k| self.state[k])
     }
 
     /// ḣ, m/s and rad/s.
-    #[must_use]
     pub fn rate(&self) -> Six {
         std::array::from_fn(|k| self.state[6 + k])
     }
@@ -333,7 +323,6 @@ impl Structure {
     }
 
     /// Axial forces of the legs on the platform, as a change from rest, N.
-    #[must_use]
     pub fn leg_forces(&self) -> Six {
         self.forces_on_legs().0
     }

@@ -70,19 +70,16 @@ impl PlatformStudy {
     }
 
     /// Ticks of a run.
-    #[must_use]
     pub fn ticks(&self) -> usize {
         self.targets.len()
     }
 
     /// Length of a run, s.
-    #[must_use]
     pub fn seconds(&self) -> f64 {
         self.targets.len() as f64 * self.interval
     }
 
     /// A controller for [`PlatformStudy::run`], one for each thread.
-    #[must_use]
     pub fn controller(&self) -> Controller {
         self.controller.fork()
     }

@@ -53,13 +53,11 @@ impl PoseErrors {
     }
 
     /// Number of errors.
-    #[must_use]
     pub fn count(&self) -> usize {
         self.count
     }
 
     /// The part of the path that they cover.
-    #[must_use]
     pub fn coverage(&self) -> Coverage {
         Coverage::new(self.count, self.path, self.interval)
     }
@@ -69,43 +67,36 @@ impl PoseErrors {
     }
 
     /// Root mean square of each coordinate, nm and nrad.
-    #[must_use]
     pub fn rms_nano(&self) -> Six {
         self.squares.map(|square| libm::sqrt(square / self.divisor()) * 1e9)
     }
 
     /// Largest magnitude of each coordinate, nm and nrad.
-    #[must_use]
     pub fn peak_nano(&self) -> Six {
         self.peaks.map(|peak| peak * 1e9)
     }
 
     /// Norm of the root mean squares of x, y and z, nm.
-    #[must_use]
     pub fn rms_translation_nm(&self) -> f64 {
         norms(self.rms_nano())[0]
     }
 
     /// Norm of the root mean squares of the three angles, nrad.
-    #[must_use]
     pub fn rms_orientation_nrad(&self) -> f64 {
         norms(self.rms_nano())[1]
     }
 
     /// Mean of |error of P_C|, nm.
-    #[must_use]
     pub fn mean_translation_nm(&self) -> f64 {
         self.translation_norms / self.divisor() * 1e9
     }
 
     /// Mean norm of the errors of the three angles, nrad.
-    #[must_use]
     pub fn mean_orientation_nrad(&self) -> f64 {
         self.orientation_norms / self.divisor() * 1e9
     }
 
     /// Largest |error of P_C|, nm.
-    #[must_use]
     pub fn peak_translation_nm(&self) -> f64 {
         self.largest_translation * 1e9
     }
@@ -131,7 +122,6 @@ pub struct PoseRow {
 
 impl PoseRow {
     /// Figures of a run.
-    #[must_use]
     pub fn of(trajectory: &str, mode: &str, frequency: f64, errors: &PoseErrors) -> Self {
         Self {
             trajectory: trajectory.to_owned(),
@@ -144,13 +134,11 @@ impl PoseRow {
     }
 
     /// Norm of the errors of x, y and z, nm.
-    #[must_use]
     pub fn translation_nm(&self) -> f64 {
         norms(self.rms_nano)[0]
     }
 
     /// Norm of the errors of the angles, nrad.
-    #[must_use]
     pub fn orientation_nrad(&self) -> f64 {
         norms(self.rms_nano)[1]
     }
@@ -165,13 +153,11 @@ pub struct PoseTable {
 
 impl PoseTable {
     /// A run, if it was made.
-    #[must_use]
     pub fn row(&self, trajectory: &str, mode: &str, frequency: f64) -> Option<&PoseRow> {
         self.rows.iter().find(|row| row.trajectory == trajectory && row.mode == mode && row.frequency_hz == frequency)
     }
 
     /// CSV, one line per run.
-    #[must_use]
     pub fn to_csv(&self) -> String {
         let mut out = String::from(
             "trajectory,mode,frequency_Hz,x_nm,y_nm,z_nm,rx_nrad,ry_nrad,rz_nrad,peak_nm,seconds,path_seconds\n",
@@ -187,7 +173,6 @@ impl PoseTable {
     }
 
     /// Text, one line per run: rms errors, and `beside_paper` the paper's where it has the run.
-    #[must_use]
     pub fn to_text(&self, beside_paper: bool) -> String {
         let mut out = String::from(
             "rms error  Hz mode        x nm    y nm    z nm norm nm rx nrad ry nrad rz nrad  over s  path s\n",
@@ -221,7 +206,6 @@ fn with_norm(rms: Six) -> [f64; 7] {
 const PAPER: &str = include_str!("paper.csv");
 
 /// The paper's rms errors of a run (nm and nrad), if it made it.
-#[must_use]
 pub fn paper_rms(trajectory: &str, mode: &str, frequency: f64) -> Option<Six> {
     let column = [0.1, 1.0, 10.0].iter().position(|f| *f == frequency)?;
     let numbers =
@@ -265,7 +249,6 @@ const PAPER_MACHINING: [(&str, &str, f64, f64); 4] = [
 ];
 
 /// The paper's mean error norms of a run (nm and nrad), if it made it.
-#[must_use]
 pub fn paper_machining(part: &str, mode: &str) -> Option<[f64; 2]> {
     let found = PAPER_MACHINING.iter().find(|(work, law, ..)| *work == part && *law == mode)?;
     Some([found.2, found.3])
@@ -285,20 +268,17 @@ impl MachiningTable {
     }
 
     /// A run, if it was made.
-    #[must_use]
     pub fn row(&self, part: &str, mode: &str) -> Option<&MachiningRow> {
         self.rows.iter().find(|row| row.part == part && row.mode == mode)
     }
 
     /// Translation and orientation error of one mode over that of another on the same part.
-    #[must_use]
     pub fn ratio(&self, part: &str, mode: &str, over: &str) -> Option<[f64; 2]> {
         let (a, b) = (self.row(part, mode)?, self.row(part, over)?);
         Some([a.translation_nm / b.translation_nm, a.orientation_nrad / b.orientation_nrad])
     }
 
     /// CSV, one line per run.
-    #[must_use]
     pub fn to_csv(&self) -> String {
         let mut out = String::from("part,mode,translation_nm,orientation_nrad,peak_nm,seconds,path_seconds\n");
         for row in &self.rows {
@@ -312,7 +292,6 @@ impl MachiningTable {
 
     /// Text, one line per run, and `beside_paper` with the paper's figures where it has them. Its orientations are those of the
     /// print: at or below what its own gauges can see (2.2 nm on ±80 mm is 20 nrad).
-    #[must_use]
     pub fn to_text(&self, beside_paper: bool) -> String {
         let mut out = String::from("mean error norm            nm      nrad  over s  path s");
         out.push_str(if beside_paper { "   paper nm      nrad\n" } else { "\n" });

@@ -86,7 +86,6 @@ impl<'r, 'm, W: Write> RecordedController<'r, 'm, W> {
     }
 
     /// Reason why it ended early, if it did.
-    #[must_use]
     pub fn ended(&self) -> Option<&RecordingEnd> {
         self.ended.as_ref()
     }

@@ -59,7 +59,6 @@ impl fmt::Display for Difference {
 }
 
 /// The first difference between two traces, or `None` if every word is the same.
-#[must_use]
 pub fn first_difference(a: &Trace, b: &Trace) -> Option<Difference> {
     header_difference(a, b).or_else(|| word_difference(a, b)).or_else(|| {
         let (a, b) = (a.len(), b.len());

@@ -31,7 +31,6 @@ pub struct Multisine {
 impl Multisine {
     /// `duration` in s. The fastest sine has `frequency` (Hz). Each coordinate stays within `center` ± `reach` (m or
     /// rad) after the fade. Amplitudes fall with frequency; phases come from `seed`.
-    #[must_use]
     pub fn new(duration: f64, frequency: f64, center: [f64; 6], reach: [f64; 6], seed: u64) -> Self {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         rng.set_stream(PHASES);

@@ -69,7 +69,6 @@ const UNITS: [f64; 6] = [1e-6, 1e-6, 1e-6, 1e-3, 1e-3, 1e-3];
 
 impl PaperPose {
     /// A path in its corrected form, at f_c (Hz).
-    #[must_use]
     pub fn corrected(path: PaperPath, frequency: f64) -> Self {
         Self { path, reading: Reading::Corrected, frequency }
     }

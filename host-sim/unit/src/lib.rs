@@ -82,7 +82,6 @@ pub const SETTINGS: [(&str, bool); 5] =
 
 impl Settings {
     /// Their words, one for each of [`SETTINGS`].
-    #[must_use]
     pub fn words(&self) -> [u64; SETTINGS.len()] {
         let whole = [u64::from(self.seed), u64::from(self.noise), u64::from(self.tolerances)];
         [whole[0], whole[1], whole[2], self.stiffness_ratio.to_bits(), self.gain_ratio.to_bits()]
@@ -124,7 +123,6 @@ impl std::error::Error for UnitError {}
 impl Description {
     /// Stems of the inputs: six reals each. `voltage` in V; `disturbance` is a force (N) and torque (N m) on the platform about P_C
     /// in base axes, held until it is changed.
-    #[must_use]
     pub fn inputs(&self) -> &'static [&'static str] {
         match self.kind {
             Kind::Platform { .. } => &["voltage", "disturbance"],
@@ -136,7 +134,6 @@ impl Description {
     /// unit that the controller takes (m or V) and `wrench` of the force sensor (N, N m), or `displacement` (m). Then what no sensor
     /// tells: `true_pose` from rest (m, rad), `true_extension` of the legs from rest (m), `stack_voltage` from the lowest (V); or
     /// `true_displacement` (m).
-    #[must_use]
     pub fn outputs(&self) -> &'static [&'static str] {
         match self.kind {
             Kind::Platform { .. } => &["gauge", "wrench", "true_pose", "true_extension", "stack_voltage"],
@@ -145,7 +142,6 @@ impl Description {
     }
 
     /// Voltage at which the legs stand before the first tick, V.
-    #[must_use]
     pub fn rest_voltage(&self) -> f64 {
         match &self.kind {
             Kind::Platform { nominal, .. } => nominal.rest_voltage_v,
@@ -154,7 +150,6 @@ impl Description {
     }
 
     /// The machine after its pre-cycle, at rest with the gauges zeroed.
-    #[must_use]
     pub fn prepared(&self, settings: &Settings) -> Plant {
         let Settings { seed, noise, tolerances, stiffness_ratio, gain_ratio } = *settings;
         let seed = u64::from(seed);

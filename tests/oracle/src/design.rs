@@ -276,13 +276,11 @@ pub struct Design {
 
 impl Rule {
     /// The design for a plant; `notch_damping` is ζ_d of the modal notch, if there is one.
-    #[must_use]
     pub fn new(plant: Plant, notch_damping: Option<f64>) -> Self {
         Self { plant, notch_damping }
     }
 
     /// The design for the nominal data of a machine, its legs' lag and a control period (s).
-    #[must_use]
     pub fn of(nominal: &PlatformParameters, lag: f64, period: f64, notch_damping: Option<f64>) -> Self {
         let leg = host_sim::plant::LegParameters::reference();
         let structure = Specimen::ideal(nominal, &leg).structure();
@@ -290,7 +288,6 @@ impl Rule {
     }
 
     /// The nominal plant.
-    #[must_use]
     pub fn plant(&self) -> &Plant {
         &self.plant
     }
@@ -301,25 +298,21 @@ impl Rule {
     }
 
     /// Spectral radius of the loop with `gains` on a plant that deviates; infinite if the geometry is singular.
-    #[must_use]
     pub fn radius(&self, gains: Gains, deviation: Deviation) -> f64 {
         SampledLoop::new(&self.plant, gains, self.notch(), deviation).map_or(f64::INFINITY, |loop_| loop_.radius())
     }
 
     /// Largest factor on `gains` for which the radius stays below 1, by bisection to 0.1 %.
-    #[must_use]
     pub fn margin(&self, gains: Gains, deviation: Deviation) -> f64 {
         largest(2e4, |factor| self.radius(gains.scaled(factor), deviation) < 1.0)
     }
 
     /// Largest λ for which the radius stays below 1, by bisection to 0.1 %.
-    #[must_use]
     pub fn gain_margin(&self, gains: Gains, deviation: Deviation) -> f64 {
         largest(100.0, |gain| self.radius(gains, Deviation { gain, ..deviation }) < 1.0)
     }
 
     /// The start rule of the study (`sixdof.md` §6).
-    #[must_use]
     pub fn design(&self) -> Design {
         let alone = Gains { proportional: 0.0, integral: 0.0, level: 1.0, drift: 0.0 };
         let limit = self.margin(alone, Deviation::NONE);

@@ -48,7 +48,6 @@ const DRIFT_WEIGHT: f64 = 0.011;
 
 impl Oracle {
     /// Six legs with one table; `drive_max` in V; `lsb` is the DAC's step in V, 0 for a continuous drive.
-    #[must_use]
     pub fn new(table: Table, drive_max: f64, lsb: f64) -> Self {
         let rest = Leg { memory: Memory::new(), requested: 0.0, level: 0.0, drift: 0.0 };
         let legs = std::array::from_fn(|_| rest.clone());

@@ -125,7 +125,6 @@ pub struct PlatformOracle {
 
 impl PlatformOracle {
     /// A controller at power-up. `None` if geometry or gauges are singular.
-    #[must_use]
     pub fn new(settings: &Settings) -> Option<Self> {
         let Settings { plant, combined, position, .. } = settings;
         let structure = &plant.structure;

@@ -13,7 +13,6 @@ pub struct Table {
 
 impl Table {
     /// A table from a record with a row at every node: peak minus the falling branch.
-    #[must_use]
     pub fn from_record(record: &ReversalRecord, intervals: usize, drive_max: f64) -> Self {
         let interval = drive_max / intervals as f64;
         let mut nodes = vec![vec![0.0; intervals + 1]; intervals + 1];
@@ -35,7 +34,6 @@ impl Table {
     }
 
     /// E(up, down) in m for 0 ≤ `down` ≤ `up` ≤ full drive (V): bilinear in the squares, linear in the diagonal triangles.
-    #[must_use]
     pub fn everett(&self, up: f64, down: f64) -> f64 {
         let cell = |x: f64| ((x / self.interval) as usize).min(self.intervals - 1);
         let (i, j) = (cell(up), cell(down));

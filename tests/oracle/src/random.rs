@@ -17,7 +17,6 @@ const NOMINAL_STREAM: u64 = 2 << 32;
 
 /// Random machine `number` of `seed`: nominal stiffness 0.7 to 1.4 times the reference platform's, damping ratio 1
 /// to 5 %, and tolerances as usual.
-#[must_use]
 pub fn machine(seed: u64, number: u32) -> Specimen {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     rng.set_stream(NOMINAL_STREAM + u64::from(number));

@@ -48,7 +48,6 @@ impl InputRecording {
     }
 
     /// The words in little-endian, as a target reads them, without header.
-    #[must_use]
     pub fn to_bytes(&self) -> Vec<u8> {
         self.words.iter().flat_map(|word| word.to_le_bytes()).collect()
     }

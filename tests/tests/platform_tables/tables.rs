@@ -1,6 +1,6 @@
 //! Tables 5 to 9: the reference machine, and random ones.
 
-use host_sim::platform::scenario::{FREE_MODES, MACHINING_MODES, NamedTrajectory};
+use host_sim::platform::scenario::{FREE_MODES, MACHINING_MODES};
 use host_sim::platform::table::{MachiningTable, PoseRow, PoseTable, paper_rms};
 use host_sim::platform::{Specimen, WorkPart};
 use host_sim::trajectory::{PaperPath, PaperPose};
@@ -20,11 +20,11 @@ fn free_motion(bench: &Bench, frequencies: &[f64]) -> PoseTable {
     for (name, path) in CASES {
         for &frequency in frequencies {
             let trajectory = PaperPose::corrected(path, frequency);
-            let named = [NamedTrajectory { name, frequency, trajectory: &trajectory }];
             // No ranking is asked of F alone but in case 1 above the noise.
             let alone: &[_] = if name == "case-1" && frequency > 0.5 { &ControlMode::WORDS[2..4] } else { &[] };
             let modes: Vec<_> = FREE_MODES.iter().chain(alone).copied().collect();
-            table.rows.extend(scenario.free_motion(&mut controller, &modes, &named).expect("a run").rows);
+            let runs = scenario.free_motion(&mut controller, &modes, (name, frequency), &trajectory).expect("a run");
+            table.rows.extend(runs.rows);
         }
     }
     table
@@ -67,10 +67,9 @@ fn tables_5_to_9_on_the_reference_machine() {
     println!("closest to the paper: {:.3} of it", below_the_paper(&table));
     if length(true, false) {
         let trajectory = PaperPose::corrected(PaperPath::Case1, 1.0);
-        let named = [NamedTrajectory { name: "case-1", frequency: 1.0, trajectory: &trajectory }];
         let best: Vec<_> = FREE_MODES.into_iter().filter(|(mode, _)| *mode == "pf-pcc").collect();
-        let run = bench.scenario().free_motion(&mut bench.controller(), &best, &named).expect("a run");
-        table.rows.extend(run.rows);
+        let runs = bench.scenario().free_motion(&mut bench.controller(), &best, ("case-1", 1.0), &trajectory);
+        table.rows.extend(runs.expect("a run").rows);
     }
     println!("{}", table.to_text(true));
     let found = translation(&table, "case-1", "pf-pcc", 1.0);

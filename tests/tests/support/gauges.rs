@@ -1,11 +1,14 @@
 //! Platforms with gauges, as models: layouts that no spec file needs to hold.
 
+use std::marker::PhantomData;
+
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use specgen::compile::compile;
 use specgen::diagnostic::Diagnostic;
 use specgen::everett::EverettTable;
-use specgen::ir::{Ir, Sensing};
+use specgen::ir::scalar::{Numbers as _, Rounding};
+use specgen::ir::{Ir, Sensing, constants};
 use specgen::lower::{self, Origin};
 use specgen::model::{Model, Probe, Scalar, SetpointRules, TaskSpace};
 use specgen::spec::{self, SpecSource};
@@ -163,41 +166,16 @@ pub fn double<T: Real>(value: T) -> f64 {
     }
 }
 
-pub fn leak<T: Real>(values: &[f64]) -> &'static [T] {
-    values.iter().map(|v| real(*v)).collect::<Vec<T>>().leak()
-}
-
 /// The runtime's gauges with the constants of the IR.
 pub fn runtime<T: Real>(ir: &Ir) -> Gauges<'static, T> {
-    let s = sensing(ir);
-    let vectors = |rows: [[f64; 3]; 6]| rows.map(|row| row.map(real));
-    let matrix = |rows: [[f64; 6]; 6]| rows.map(|row| row.map(real));
-    Gauges {
-        direction: vectors(s.direction),
-        normal: vectors(s.normal),
-        skew: vectors(s.skew),
-        pierced: vectors(s.pierced),
-        inverse: matrix(s.inverse),
-        curvature: matrix(s.curvature),
-        passes: s.passes as usize,
-        arc_sine: leak(&s.arc_sine),
-        arc_tangent: leak(&s.arc_tangent),
-    }
+    constants::gauges(&Rounding(PhantomData::<T>), sensing(ir))
 }
 
 pub fn series<T: Real>(ir: &Ir) -> Series<'static, T> {
-    Series { sine: leak(&ir.kinematics.sine), versine: leak(&ir.kinematics.versine) }
+    legs(ir).0.series
 }
 
 pub fn legs<T: Real>(ir: &Ir) -> (Legs<'static, T>, [[T; 6]; 6]) {
-    let k = &ir.kinematics;
-    let legs = Legs {
-        rest_leg: k.rest_leg.map(|row| row.map(real)),
-        platform_joint: k.platform_joint.map(|row| row.map(real)),
-        rest_length: k.rest_length.map(real),
-        series: series(ir),
-        root: leak(&k.root),
-        newton_steps: k.newton_steps as usize,
-    };
-    (legs, k.inverse_jacobian.map(|row| row.map(real)))
+    let numbers = Rounding(PhantomData::<T>);
+    (constants::legs(&numbers, &ir.kinematics), numbers.matrix(&ir.kinematics.inverse_jacobian))
 }

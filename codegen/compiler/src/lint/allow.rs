@@ -107,7 +107,6 @@ pub fn allow(model: &Model, findings: &mut [Diagnostic]) {
 }
 
 /// Findings about exceptions that match no finding.
-#[must_use]
 pub fn unused(model: &Model, findings: &[Diagnostic]) -> Vec<Diagnostic> {
     let used = |allowed: &str| {
         let covered =

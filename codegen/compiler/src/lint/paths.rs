@@ -192,7 +192,6 @@ pub struct PathDemand {
 }
 
 /// Checks every trajectory of `task`; `paths` are their poses, in the order of the spec.
-#[must_use]
 pub fn check(
     model: &Model,
     task: &TaskSpace,

@@ -11,7 +11,6 @@ pub(super) static LINTS: Lints = Lints { rules: &[fits_period], codes: &[] };
 const CERTAIN: f64 = 0.8;
 
 /// Typical time of the longest tick on the named board, s; none for an emulated one.
-#[must_use]
 pub fn about(model: &Model) -> Option<f64> {
     let Mcu::Board(board) = model.target.mcu else { return None };
     let ticks = match model.controller.scalar {

@@ -27,7 +27,6 @@ pub struct Row {
 const AXES: [&str; 6] = ["x", "y", "z", "θx", "θy", "θz"];
 
 /// The commanded pose, then the measured one, axis by axis.
-#[must_use]
 pub fn rows(precision: &Precision) -> Vec<Row> {
     let of = |what: &'static str, figures: &Figures| {
         let figures = *figures;
@@ -49,7 +48,6 @@ pub fn rows(precision: &Precision) -> Vec<Row> {
 }
 
 /// The precision as text for `specgen check`.
-#[must_use]
 pub fn describe(precision: &Precision, scalar: Scalar) -> String {
     // Writing to a String cannot fail.
     let mut text = String::new();

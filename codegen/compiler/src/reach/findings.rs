@@ -207,7 +207,6 @@ fn advice(path: &PathReach, what: &str) -> String {
 }
 
 /// The reach as text for `specgen check`. `biased`: set-points are relative to a bias, else to rest.
-#[must_use]
 pub fn describe(reach: &Reach, biased: bool) -> String {
     // Rounding errors of a bound at zero are not shown as -0.0.
     let tenths = |value: f64| libm::round(value * 10.0) / 10.0 + 0.0;

@@ -6,7 +6,6 @@ use specgen_numerics::{cross, dot, norm, rotation};
 
 /// Largest angle between a leg and its direction at rest over corners and interior of the workspace `bounds`, rad: seen from
 /// the base, and from the platform.
-#[must_use]
 pub fn angles(geometry: &Geometry, bounds: &Pose) -> [f64; 2] {
     let mut largest = [0.0; 2];
     for pose in travel::samples(bounds) {

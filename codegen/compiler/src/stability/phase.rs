@@ -13,7 +13,6 @@ const BISECTIONS: u32 = 12;
 ///
 /// `transition` gives the matrix of one tick with the plant's inputs times a factor, in which it is affine. With the factor
 /// e^(−jφ) it is complex, A − jB; its eigenvalues and their conjugates are those of [A B; −B A].
-#[must_use]
 pub fn phase_margin(transition: impl Fn(f64) -> Matrix) -> Option<f64> {
     let (open, closed) = (transition(0.0), transition(1.0));
     let n = open.size();

@@ -59,7 +59,6 @@ pub struct RestDynamics {
 
 impl RestDynamics {
     /// M and J of the controller's own model at rest.
-    #[must_use]
     pub fn of(platform: &Platform<f64>) -> Self {
         let mass = mass_matrix(platform, &[0.0; 6]);
         Self {
@@ -192,7 +191,6 @@ pub fn design(model: &Model, task: &TaskSpace, plant: &RestDynamics) -> Result<D
 /// The amplifier delays by its lag, and every mode by 2 ζ/ω, the slope of its phase, which is the same for all with c_a = β k_a. A
 /// voltage is held over a period, half a period late on average, but it commands the pose at the end of the period. So half a
 /// period is subtracted.
-#[must_use]
 pub fn lead(model: &Model, task: &TaskSpace, basis: &ModalBasis) -> f64 {
     task.lead.unwrap_or_else(|| {
         let late = model.amplifier.lag + 2.0 * task.modal_damping / basis.frequencies[0] - 0.5 * model.timing.period;
@@ -202,20 +200,17 @@ pub fn lead(model: &Model, task: &TaskSpace, basis: &ModalBasis) -> f64 {
 
 impl Design {
     /// The law at start-up, and its tuning.
-    #[must_use]
     pub fn law(&self, model: &Model, task: &TaskSpace) -> (ControlMode, &Tuning) {
         let mode = start_mode(model, task);
         (mode, self.tuning(mode))
     }
 
     /// The numbers of a mode.
-    #[must_use]
     pub fn tuning(&self, mode: ControlMode) -> &Tuning {
         if mode.uses_position_gains() { &self.position } else { &self.combined }
     }
 
     /// The closed loop of the spec without tuning; `task` is its `[control]`.
-    #[must_use]
     pub fn closed_loop(&self, model: &Model, task: &TaskSpace, plant: &RestDynamics) -> Option<ClosedLoop> {
         let active_damping = self.damping.as_ref().map(|damping| damping.sections);
         closed_loop_of(model, task, plant).map(|closed_loop| ClosedLoop {
@@ -227,7 +222,6 @@ impl Design {
 }
 
 /// The closed loop of a spec without tuning and active damping; none if the platform does not have six modes.
-#[must_use]
 pub fn closed_loop_of(model: &Model, task: &TaskSpace, plant: &RestDynamics) -> Option<ClosedLoop> {
     let basis = ModalBasis::of(plant, model.actuator.axial_stiffness)?;
     // c_a = β k_a with β = 2 ζ/ω_1: damping grows with frequency.

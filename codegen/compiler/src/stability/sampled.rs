@@ -32,7 +32,6 @@ pub struct LegDynamics {
 
 impl LegDynamics {
     /// The leg of a spec.
-    #[must_use]
     pub fn of(model: &Model) -> Self {
         Self {
             run: model.timing.period * f64::from(model.adaptation.run_interval),
@@ -78,13 +77,11 @@ impl LegDynamics {
 }
 
 /// Spectral radius of the loop from run to run, infinite if it cannot be found; `drift_weight` none for EWMA.
-#[must_use]
 pub fn spectral_radius(dynamics: &LegDynamics, level_weight: f64, drift_weight: Option<f64>, gain_ratio: f64) -> f64 {
     largest_magnitude(&transition(dynamics, level_weight, drift_weight, gain_ratio))
 }
 
 /// The loop from run to run as a matrix over [p, y, v, g, δ̂, φ̂], φ̂ left out for EWMA and g without a lag of the gauge.
-#[must_use]
 pub fn transition(dynamics: &LegDynamics, level_weight: f64, drift_weight: Option<f64>, gain_ratio: f64) -> Matrix {
     let discrete = dynamics.discretise();
     let leg = dynamics.states();
@@ -114,7 +111,6 @@ pub fn transition(dynamics: &LegDynamics, level_weight: f64, drift_weight: Optio
 /// Variance of a leg's reading at rest (m²) for unit variance of the gauge noise, and of the amplifier noise (as requested
 /// displacement). The first is over runs with the weights of level and drift in use (none without adaptation), the second over ticks
 /// of `period` (s) on the leg alone.
-#[must_use]
 pub fn shown_at_rest(dynamics: &LegDynamics, weights: Option<(f64, Option<f64>)>, period: f64) -> [f64; 2] {
     let alone = LegDynamics { run: period, ..*dynamics };
     let discrete = alone.discretise();

@@ -23,7 +23,6 @@ pub struct Part {
 
 impl Part {
     /// Path below the workspace, text.
-    #[must_use]
     pub fn files(&self) -> &'static [(&'static str, &'static str)] {
         files(self.folder)
     }
@@ -51,13 +50,11 @@ static TEXTS: LazyLock<Vec<Texts>> = LazyLock::new(|| {
 });
 
 /// Of each file of a folder of `firmware`, of `host-sim` or of `unit`: path below the workspace, text.
-#[must_use]
 pub fn files(folder: &str) -> &'static [(&'static str, &'static str)] {
     TEXTS.iter().find(|(name, _)| *name == folder).map_or(&[], |(_, files)| files)
 }
 
 /// Text of a file of the repository that studies write: a record, `Cargo.lock`.
-#[must_use]
 pub fn text(path: &str) -> &'static str {
     files("repository").iter().find(|(name, _)| *name == path).map_or("", |(_, text)| text)
 }
@@ -149,7 +146,6 @@ const fn of_board(board: &model::Part) -> Part {
 }
 
 /// All folders: boards after the folders that they share.
-#[must_use]
 pub fn all() -> Vec<Part> {
     let (before, behind) = PARTS.split_at(PARTS.iter().take_while(|part| part.folder != "tick").count());
     before.iter().copied().chain(model::BOARDS.map(of_board)).chain(behind.iter().copied()).collect()
@@ -159,7 +155,6 @@ pub fn all() -> Vec<Part> {
 pub const ALWAYS: &[&str] = &["law", "runtime", "host", "qemu"];
 
 /// [`ALWAYS`], `targets` and all that these depend on, in the order of [`all`].
-#[must_use]
 pub fn select(targets: &[&str]) -> Vec<Part> {
     let mut parts = all();
     let mut wanted: BTreeSet<&str> = ALWAYS.iter().chain(targets).copied().collect();

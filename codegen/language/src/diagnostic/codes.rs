@@ -20,13 +20,11 @@ impl Code {
     /// A code with its page as Markdown: a heading with id and title, then what is checked, and below headings of the second
     /// level `Why it matters`, `Example` and `Fix`. Lines of text have at most 80 columns. The page is one text, or a line
     /// each, as the compiler passes on the lines of a comment: with the space behind the slashes.
-    #[must_use]
     pub const fn new(id: &'static str, page: &'static [&'static str]) -> Self {
         Self { id, page }
     }
 
     /// The page as Markdown.
-    #[must_use]
     pub fn page(self) -> String {
         let mut text = String::new();
         for piece in self.page {
@@ -39,7 +37,6 @@ impl Code {
     }
 
     /// How bad every finding with this code is: its letter says so.
-    #[must_use]
     pub const fn severity(self) -> Severity {
         match self.id.as_bytes() {
             [b'E', ..] => Severity::Error,
@@ -49,14 +46,12 @@ impl Code {
     }
 
     /// The problem in a few words: the heading of the page.
-    #[must_use]
     pub fn title(self) -> &'static str {
         let heading = self.page.first().and_then(|piece| piece.lines().next()).unwrap_or_default();
         heading.split_once(": ").map_or(heading, |(_, title)| title)
     }
 
     /// What is checked and why it matters: the text of the page before its example, without headings, as one line.
-    #[must_use]
     pub fn explanation(self) -> String {
         let page = self.page();
         let text = page.split("\n## Example").next().unwrap_or_default();

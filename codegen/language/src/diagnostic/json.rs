@@ -8,7 +8,6 @@ use crate::lines::Lines;
 
 /// An array with one object for each finding: `code`, `severity` ("error", "warning", "note"), `key`, `file`, `line`,
 /// `column`, `message`, `help`. Line and column count from 1, columns in characters; fields that do not apply are null.
-#[must_use]
 pub fn to_json(diagnostics: &[Diagnostic], source: &SpecSource) -> Value {
     let lines = Lines::new(&source.text);
     diagnostics

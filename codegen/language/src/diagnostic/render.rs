@@ -14,7 +14,6 @@ const MAX_SHOWN: usize = 160;
 const WIDTH: usize = 140;
 
 /// All findings in turn, and a last line with their number; empty without findings.
-#[must_use]
 pub fn render(diagnostics: &[Diagnostic], source: &SpecSource, color: bool) -> String {
     let renderer = if color { Renderer::styled() } else { Renderer::plain() }.term_width(WIDTH);
     let lines = Lines::new(&source.text);

@@ -93,7 +93,6 @@ macro_rules! choice {
             pub(crate) const WORDS: &[&str] = &[$($word),+];
 
             /// Its word in a spec.
-            #[must_use]
             pub const fn word(self) -> &'static str {
                 match self {
                     $(Self::$variant => $word,)+

@@ -53,7 +53,6 @@ section! {
 
 impl Actuator {
     /// ρ̂ of a whole leg, m/V: stacks in series add.
-    #[must_use]
     pub fn leg_gain(&self) -> f64 {
         f64::from(self.stacks) * self.stack_gain
     }
@@ -107,7 +106,6 @@ section! {
 
 impl Sensor {
     /// A step of its converter, m.
-    #[must_use]
     pub fn step(&self) -> f64 {
         let [low, high] = self.range;
         (high - low) / libm::exp2(f64::from(self.bits))

@@ -71,13 +71,11 @@ choice! {
 
 impl LegModelKind {
     /// That of a word in a spec.
-    #[must_use]
     pub fn of_word(word: &str) -> Option<Self> {
         Self::FITTED.into_iter().chain([Self::Auto]).find(|kind| kind.word() == word)
     }
 
     /// All words.
-    #[must_use]
     pub fn words() -> String {
         Self::WORDS.join(", ")
     }

@@ -94,7 +94,6 @@ impl Mcu {
     };
 
     /// Its data.
-    #[must_use]
     pub const fn part(self) -> Part {
         match self {
             Self::Mps2An500 => M7,
@@ -104,13 +103,11 @@ impl Mcu {
     }
 
     /// The microcontroller called `name` in a spec.
-    #[must_use]
     pub fn named(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|mcu| mcu.part().name == name)
     }
 
     /// Those whose FPU computes in double precision, by name.
-    #[must_use]
     pub fn doubles() -> Vec<&'static str> {
         Self::ALL.iter().map(|mcu| mcu.part()).filter(|part| part.double).map(|part| part.name).collect()
     }

@@ -100,7 +100,6 @@ fn joints(fields: &Fields) -> Option<[[[f64; 3]; 6]; 2]> {
 
 impl Geometry {
     /// r₀ = P₀ + P_i − B_i (AI.2), the legs at rest from joint to joint in {B}, m.
-    #[must_use]
     pub fn rest_legs(&self) -> [[f64; 3]; 6] {
         core::array::from_fn(|leg| {
             let ([bx, by, bz], [px, py, pz]) = (self.base_joints[leg], self.platform_joints[leg]);
@@ -109,7 +108,6 @@ impl Geometry {
     }
 
     /// Largest distance of a platform joint from P_C, m.
-    #[must_use]
     pub fn joint_radius(&self) -> f64 {
         let distances = self.platform_joints.map(|[x, y, z]| libm::sqrt(x * x + y * y + z * z));
         distances.into_iter().fold(0.0, |largest, d| if d > largest { d } else { largest })
@@ -168,7 +166,6 @@ section! {
 
 impl Workspace {
     /// Bounds on the magnitudes of x, y, z (m), θx, θy, θz (rad).
-    #[must_use]
     pub fn bounds(&self) -> [f64; 6] {
         let ([x, y, z], [a, b, c]) = (self.translation, self.rotation);
         [x, y, z, a, b, c]

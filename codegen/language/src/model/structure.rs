@@ -62,7 +62,6 @@ section! {
 impl StructuralMode {
     /// Whether two modes, each with kind, number of leg or gauge, and frequency (Hz), count as one: of a kind at the same place with
     /// frequencies that differ by at most 1 %.
-    #[must_use]
     pub fn coincide(
         (kind, at, frequency): (StructuralKind, Option<usize>, f64),
         (other_kind, other_at, other): (StructuralKind, Option<usize>, f64),
@@ -107,7 +106,6 @@ section! {
 
 impl StructuralUncertainty {
     /// Lowest frequency of such a mode, Hz, on a platform whose lowest mode is `lowest`, Hz.
-    #[must_use]
     pub fn from_hz(&self, lowest: f64) -> f64 {
         self.from.unwrap_or(2.5 * lowest)
     }

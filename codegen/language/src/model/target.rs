@@ -73,7 +73,6 @@ section! {
 
 impl Requirements {
     /// Largest noise at rest of the axis, 0 to 5, m or rad, and its key; none if the spec has no limit.
-    #[must_use]
     pub fn noise_of(&self, axis: usize) -> Option<(f64, &'static str)> {
         if axis > 2 {
             return self.rotation_noise.map(|limit| (limit, "requirements.rotation_noise"));
@@ -111,7 +110,6 @@ section! {
 
 impl Lint {
     /// The reason that excepts `key`, or the list that it is an item of.
-    #[must_use]
     pub fn reason(&self, key: &str) -> Option<&str> {
         self.reasons().find(|(allowed, _)| covers(allowed, key)).map(|(_, reason)| reason)
     }

@@ -257,7 +257,6 @@ section! {
 
 impl StoredDesign {
     /// The section as in a spec, from which the same design is read.
-    #[must_use]
     pub fn text(&self) -> String {
         let array = |values: &[f64]| {
             let values: Vec<String> = values.iter().map(|value| format!("{value:?}")).collect();
@@ -404,7 +403,6 @@ pub enum TrajectoryKind {
 
 impl TrajectoryKind {
     /// The key that sets how fast it is, and its value: Hz of `frequency`, s of `time` and `period`.
-    #[must_use]
     pub const fn rate(&self) -> (&'static str, f64) {
         match self {
             Self::Paper { frequency, .. } => ("frequency", *frequency),

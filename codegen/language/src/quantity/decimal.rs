@@ -12,26 +12,22 @@ pub struct Decimal {
 
 impl Decimal {
     /// `digits` (ASCII digits only) · 10^`exponent`.
-    #[must_use]
     pub fn new(digits: &str, exponent: i64) -> Self {
         let trimmed = digits.trim_start_matches('0');
         Self { digits: if trimmed.is_empty() { "0".to_owned() } else { trimmed.to_owned() }, exponent }
     }
 
     /// Whether the value is exactly zero.
-    #[must_use]
     pub fn is_zero(&self) -> bool {
         self.digits == "0"
     }
 
     /// Times 10^`power`.
-    #[must_use]
     pub fn shifted(&self, power: i64) -> Self {
         Self { digits: self.digits.clone(), exponent: self.exponent.saturating_add(power) }
     }
 
     /// The exact product.
-    #[must_use]
     pub fn times(&self, other: &Self) -> Self {
         let left: Vec<u32> = self.digits.bytes().rev().map(|b| u32::from(b - b'0')).collect();
         let right: Vec<u32> = other.digits.bytes().rev().map(|b| u32::from(b - b'0')).collect();
@@ -83,7 +79,6 @@ impl Decimal {
     }
 
     /// The nearest f64 (ties to even); infinite or zero where the range of f64 ends.
-    #[must_use]
     pub fn to_f64(&self) -> f64 {
         // The text is a well-formed float by construction, so that the parse cannot fail.
         format!("{}e{}", self.digits, self.exponent).parse().unwrap_or(f64::NAN)

@@ -69,14 +69,12 @@ impl Dimension {
     pub const ANGULAR_JERK: Self = Self::new([0, 0, -3, 0, 1, 0]);
 
     /// From the exponents of m, kg, s, V, rad, byte.
-    #[must_use]
     pub const fn new(exponents: [i8; 6]) -> Self {
         let [m, kg, s, volt, rad, byte] = exponents;
         Self { exponents: [m, kg, s, volt, rad, byte, 0] }
     }
 
     /// The product with `other` to the power `power`; `None` if an exponent leaves the range of `i8`.
-    #[must_use]
     pub fn times(self, other: Self, power: i8) -> Option<Self> {
         let mut exponents = self.exponents;
         for (own, more) in exponents.iter_mut().zip(other.exponents) {
@@ -93,19 +91,16 @@ impl Dimension {
     }
 
     /// Whether it contains a mass, as a force does.
-    #[must_use]
     pub const fn contains_mass(self) -> bool {
         self.exponents[1] == 1
     }
 
     /// Whether this is a spectral density of `of`: "nm/√Hz" of a length.
-    #[must_use]
     pub fn is_density_of(self, of: Self) -> bool {
         self.times(Self::ROOT_HERTZ, 1) == Some(of)
     }
 
     /// With article, for messages: "a length"; dimensions without a name of their own are spelt in base units.
-    #[must_use]
     pub fn describe(self) -> String {
         NAMES
             .iter()
@@ -119,7 +114,6 @@ impl Dimension {
     }
 
     /// The dimension in base units: "kg m^2 s^-2".
-    #[must_use]
     pub fn in_base_units(self) -> String {
         let factors: Vec<String> = [1, 0, 2, 3, 4, 5, 6]
             .into_iter()

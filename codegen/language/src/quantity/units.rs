@@ -15,7 +15,6 @@ pub struct Constant {
 
 impl Constant {
     /// The constant as a decimal.
-    #[must_use]
     pub fn decimal(self) -> Decimal {
         Decimal::new(self.digits, self.exponent)
     }
@@ -194,7 +193,6 @@ impl Entry {
 }
 
 /// The unit with the symbol `name`, with its prefix resolved.
-#[must_use]
 pub fn find(name: &str) -> Option<Unit> {
     SYMBOLS.iter().find(|symbol| symbol.text == name).map(|symbol| symbol.unit)
 }
@@ -218,7 +216,6 @@ pub(super) fn regardless_of_case(name: &str) -> Vec<(String, Unit)> {
 }
 
 /// The units as a sentence for the reference.
-#[must_use]
 pub fn units_markdown() -> String {
     let names = |takes: fn(&Entry) -> bool| {
         let each = UNITS.iter().filter(move |entry| takes(entry)).map(|entry| {

@@ -1,6 +1,4 @@
 //! `specgen identify cross-talk`: six records of `watch` in; E of the assembled platform out, as a line of the spec.
-
-use std::fmt::Write as _;
 use std::path::PathBuf;
 
 use specgen_identify::cross_talk::{CrossTalk, of_records};
@@ -42,8 +40,7 @@ impl Outcome for IdentificationResult<CrossTalk> {
         );
         for row in matrix {
             let row: Vec<String> = row.iter().map(|entry| format!("{entry:.3e}")).collect();
-            // Writing to a String cannot fail.
-            let _ = writeln!(text, "    [{}],", row.join(", "));
+            text += &format!("    [{}],\n", row.join(", "));
         }
         text + "]\n" + &measured.text()
     }

@@ -1,6 +1,4 @@
 //! `specgen identify gauge`, `response` and `stiffness`: a record in, an estimate and lines of a spec out.
-
-use std::fmt::Write as _;
 use std::path::Path;
 
 use serde::Serialize;
@@ -92,8 +90,7 @@ fn bins(response: &FrequencyResponse) -> String {
     let mut text = "frequency_Hz,real_um_per_V,imaginary_um_per_V,coherence\n".to_owned();
     for bin in &response.bins {
         let [real, imaginary] = bin.h.map(|part| part * 1e6);
-        // Writing to a String cannot fail.
-        let _ = writeln!(text, "{:?},{real:?},{imaginary:?},{:?}", bin.frequency, bin.coherence);
+        text += &format!("{:?},{real:?},{imaginary:?},{:?}\n", bin.frequency, bin.coherence);
     }
     text
 }
@@ -109,13 +106,11 @@ impl Outcome for IdentificationResult<Estimate<FrequencyResponse>> {
         let mut text = format!(
             "{record}: {segments} segments of {segment} samples at {rate:.1} Hz, bins of {resolution:.3} Hz, used {low:.3} to {high:.1} Hz, coherence {coherence:.4} in the middle, misfit {misfit:.2} %\n"
         );
-        // Writing to a String cannot fail.
         let (resonance, damping) = (shown_in(f.resonance, 1.0), shown_in(f.damping_ratio, 1.0));
         let (lag, dead_time) = (shown_in(f.lag, 1e3), shown_in(f.dead_time, 1e3));
         let (sum, correlation) = (shown_in(f.lag_and_dead_time, 1e3), f.lag_dead_time_correlation);
         let (gain, error) = (f.gain.value * 1e6, f.gain.error * 1e6);
-        let _ = write!(
-            text,
+        text += &format!(
             "  resonance     {resonance} Hz\n  damping ratio {damping}\n  lag           {lag} ms\n  dead time     {dead_time} ms (including half a period of converter hold)\n  lag + dead    {sum} ms (errors of the two correlated by {correlation:.2})\n  static gain   {gain:.6} ± {error:.1e} µm/V\n"
         );
         // The lag attenuates what the resonance responds to.
@@ -123,8 +118,7 @@ impl Outcome for IdentificationResult<Estimate<FrequencyResponse>> {
         let (resonance, damping) = (f.resonance.value, f.damping_ratio.value);
         let (gain, lag) = (f.gain.value * 1e6 / (1.0 + lagging * lagging).sqrt(), f.lag.value * 1e3);
         let (measured, mode) = (measured.text(), mode_lines(f.resonance.value, f.damping_ratio.value));
-        let _ = write!(
-            text,
+        text += &format!(
             "spec lines:\n[actuator]\nresonance = \"{resonance:.1} Hz\"\ndamping_ratio = {damping:.4}\n# resonance_gain: {gain:.5} um/V, the gain of small motion behind the lag, over that of a large loop\n[amplifier]\nlag = \"{lag:.4} ms\"\n{measured}with [control], [actuator] applies to every leg; for this leg alone, write instead:\n{mode}{files}"
         );
         text
@@ -154,11 +148,8 @@ pub fn gauge(
     ui.findings(None, &report.warnings);
     let mut files = String::new();
     if let Some(path) = table {
-        let rows = report.value.table.iter().fold("gauge_V,reference_um\n".to_owned(), |mut rows, [v, y]| {
-            // Writing to a String cannot fail.
-            let _ = writeln!(rows, "{v:?},{:?}", y * 1e6);
-            rows
-        });
+        let mut rows = "gauge_V,reference_um\n".to_owned();
+        rows.extend(report.value.table.iter().map(|[v, y]| format!("{v:?},{:?}\n", y * 1e6)));
         write_table(path, rows.as_bytes())?;
         files += &wrote(path);
     }

@@ -4,7 +4,6 @@ use crate::drawing::wrote;
 use specgen_identify::leg_model::{Choice, FamilyScore, Selection, choose};
 use specgen_identify::rate::RateModel;
 use specgen_identify::{self as identify, DeadTime, Drive, GridChoice, Prediction, Report, predict};
-use std::fmt::Write as _;
 use std::path::Path;
 
 use serde::Serialize;
@@ -49,9 +48,7 @@ pub fn missing_range(paths: &[impl AsRef<Path>], bench: &Bench, given: &[String]
         whole = [if low < whole[0] { low } else { whole[0] }, if high > whole[1] { high } else { whole[1] }];
         let (least, most) = identify::extent(&record.displacement);
         let seconds = record.time[record.time.len() - 1] - record.time[0];
-        // Writing to a String cannot fail.
-        let _ = write!(
-            text,
+        text += &format!(
             "{shown}: {} samples in {seconds:.3} s, drive {low} V to {high} V, displacement {:.3} µm to {:.3} µm; ",
             record.time.len(),
             least * 1e6,
@@ -151,14 +148,13 @@ struct Table<'a> {
 impl Outcome for Table<'_> {
     fn text(&self) -> String {
         let mut text = self.grid_choice.map(curve).unwrap_or_default();
-        // Writing to a String cannot fail, here and below.
-        let _ = writeln!(text, "{}: {}", self.record, self.report.summary());
+        text += &format!("{}: {}\n", self.record, self.report.summary());
         details(self.report, &mut text);
         if let Some(validation) = self.validation {
-            let _ = writeln!(text, "{}: {}", validation.record, summary(validation));
+            text += &format!("{}: {}\n", validation.record, summary(validation));
         }
         text += &self.families;
-        let _ = writeln!(text, "lines for the spec:\n[hysteresis]\ngrid = {}", self.grid);
+        text += &format!("lines for the spec:\n[hysteresis]\ngrid = {}\n", self.grid);
         text + &self.measured.text() + &self.files
     }
 }
@@ -185,7 +181,7 @@ fn families(choice: &Choice, grid: usize, arbitrary: Option<&str>) -> String {
     }
     match arbitrary {
         Some(name) => {
-            let _ = writeln!(text, "  chosen: the simplest within a tenth of the least error on {name}");
+            text += &format!("  chosen: the simplest within a tenth of the least error on {name}\n");
         }
         None => {
             text += "  chosen: the simplest within a tenth of the best plus a fifth of the noise; a\n  \
@@ -216,33 +212,31 @@ fn curve(choice: &GridChoice) -> String {
         let held_out = format_args!("{:.3} nm", s.held_out_rms * 1e9);
         row(&mut text, &columns, &[&s.grid, &held_out, &format_args!("{:.3}", s.held_out_percent), &error]);
     }
-    let _ = writeln!(text, "  N = {}: {} (one-standard-error rule)", choice.chosen, choice.rule);
+    text += &format!("  N = {}: {} (one-standard-error rule)\n", choice.chosen, choice.rule);
     text
 }
 
 /// Further details.
 fn details(report: &Report, text: &mut String) {
-    let _ = writeln!(text, "  residual: {}", account(&report.cause));
-    let _ = writeln!(text, "  dead time {}", report.dead_time_basis);
+    *text += &format!("  residual: {}\n", account(&report.cause));
+    *text += &format!("  dead time {}\n", report.dead_time_basis);
     if report.dead_time > report.held && report.held > 0.0 {
         let (held, rest) = (report.held * 1e3, (report.dead_time - report.held) * 1e3);
-        let _ = writeln!(
-            text,
-            "  of this, {held:.3} ms is the hold of a command, since `drive_V` is a command; relative to the voltage it is {rest:.3} ms (name a measured voltage `monitor_V`)"
+        *text += &format!(
+            "  of this, {held:.3} ms is the hold of a command, since `drive_V` is a command; relative to the voltage it is {rest:.3} ms (name a measured voltage `monitor_V`)\n"
         );
     }
     if report.weightless > 0 {
-        let _ = writeln!(text, "  {} samples were given no weight (see the warnings)", report.weightless);
+        *text += &format!("  {} samples were given no weight (see the warnings)\n", report.weightless);
     }
     if report.unexcited.is_empty() {
-        let _ = writeln!(text, "  every cell of the plane was excited");
+        *text += "  every cell of the plane was excited\n";
     }
     for region in report.unexcited.iter().take(5) {
         let (cells, share, up_low, up_high) = (region.cells, region.share * 100.0, region.up[0], region.up[1]);
         let (down_low, down_high) = (region.down[0], region.down[1]);
-        let _ = writeln!(
-            text,
-            "  not excited: {cells} cells ({share:.1} %), up_threshold {up_low:.3} to {up_high:.3} V, down_threshold {down_low:.3} to {down_high:.3} V; there the measured sum is distributed evenly"
+        *text += &format!(
+            "  not excited: {cells} cells ({share:.1} %), up_threshold {up_low:.3} to {up_high:.3} V, down_threshold {down_low:.3} to {down_high:.3} V; there the measured sum is distributed evenly\n"
         );
     }
 }

@@ -1,6 +1,4 @@
 //! `specgen identify linear`.
-
-use std::fmt::Write as _;
 use std::path::Path;
 
 use serde::Serialize;
@@ -111,7 +109,7 @@ impl Outcome for LinearRelation {
         let mut text = table(&self.report);
         match &self.spec {
             None => static_verdict(&self.report, &mut text),
-            Some(judged) => judged.write(&mut text),
+            Some(judged) => text += &judged.text(),
         }
         lines(&self.report, self.spec.as_ref().map(|judged| judged.stacks), &mut text);
         text + &self.measured.text() + &self.plot
@@ -138,12 +136,10 @@ fn table(report: &LinearReport) -> String {
             &[&hertz, &gain, &error, &offset, &width, &percent, &correlation, &r.cycles, &r.record],
         );
     }
-    // Writing to a String cannot fail, here and below.
     let (gain, frequency, low) = (report.reference_gain * 1e6, report.reference_frequency, report.gain_ratio[0]);
     let high = report.gain_ratio[1];
-    let _ = writeln!(
-        text,
-        "reference: ρ̂ = {gain:.6} µm/V, at {frequency:.4} Hz; λ = ρ/ρ̂ from {low:.4} to {high:.4} (including two standard errors)"
+    text += &format!(
+        "reference: ρ̂ = {gain:.6} µm/V, at {frequency:.4} Hz; λ = ρ/ρ̂ from {low:.4} to {high:.4} (including two standard errors)\n"
     );
     text
 }
@@ -152,10 +148,9 @@ fn static_verdict(report: &LinearReport, text: &mut String) {
     let yes = |stable: bool| if stable { "stable" } else { "not stable" };
     let (ewma_limit, level, ewma) = (report.largest_ewma_weight, PAPER[0], yes(report.ewma_is_stable(PAPER[0])));
     let (pcc_limit, drift, pcc) = (report.largest_pcc_weight, PAPER[1], yes(report.pcc_is_stable(PAPER[0], PAPER[1])));
-    let _ = writeln!(
-        text,
+    *text += &format!(
         "for a leg without dynamics: EWMA (AII.18, corrected to 0 < λω < 2) up to ω = {ewma_limit:.4}, ω = {level} is {ewma}; \
-         PCC (AII.19) up to ω1 = {pcc_limit:.4} with ω2 = {PAPER_PROPORTION:.4} ω1, ω1 = {level}, ω2 = {drift} is {pcc}"
+         PCC (AII.19) up to ω1 = {pcc_limit:.4} with ω2 = {PAPER_PROPORTION:.4} ω1, ω1 = {level}, ω2 = {drift} is {pcc}\n"
     );
     text.push_str(
         "resonance and lag of the leg lower these limits: use --spec to check the sampled loop of a platform\n",
@@ -182,25 +177,24 @@ fn judge(path: &Path, report: &LinearReport) -> Result<WeightCheck, Failure> {
 }
 
 impl WeightCheck {
-    fn write(&self, text: &mut String) {
+    fn text(&self) -> String {
         let Self { name, adaptation, .. } = self;
-        let _ = match &self.verdict {
+        match &self.verdict {
             Verdict::Stable { margins: Some(margins), .. } if adaptation.level_weight > 0.0 => {
                 let largest = margins
                     .largest_level_weight
                     .map_or_else(String::new, |w| format!("; stable up to level weight {w:.4}"));
-                writeln!(
-                    text,
-                    "{name}: the weights (level {}, drift {}) are stable over this range of λ; spectral radius {:.4}{largest}",
+                format!(
+                    "{name}: the weights (level {}, drift {}) are stable over this range of λ; spectral radius {:.4}{largest}\n",
                     adaptation.level_weight, adaptation.drift_weight, margins.spectral_radius
                 )
             }
-            Verdict::Stable { .. } => writeln!(text, "{name}: the adaptation is stable over this range of λ"),
+            Verdict::Stable { .. } => format!("{name}: the adaptation is stable over this range of λ\n"),
             Verdict::Unstable { findings, .. } => {
-                let _ = writeln!(text, "{name}: the weights are NOT stable over this range of λ");
-                findings.iter().try_for_each(|f| writeln!(text, "  {}: {}\n    help: {}", f.code, f.message, f.help))
+                let reasons = findings.iter().map(|f| format!("  {}: {}\n    help: {}\n", f.code, f.message, f.help));
+                format!("{name}: the weights are NOT stable over this range of λ\n") + &reasons.collect::<String>()
             }
-        };
+        }
     }
 }
 
@@ -212,8 +206,7 @@ fn lines(report: &LinearReport, stacks: Option<f64>, text: &mut String) {
         Some(_) => "for one stack".to_owned(),
         None => "if the record is of one stack; for a leg divide by actuator.stacks".to_owned(),
     };
-    let _ = write!(
-        text,
+    *text += &format!(
         "spec lines:\n[actuator]\nstack_gain = \"{gain:.6} um/V\"  # {note}\n[adaptation]\ngain_ratio = [{low:.3}, {high:.3}]\n"
     );
 }

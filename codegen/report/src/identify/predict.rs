@@ -1,7 +1,6 @@
 //! `specgen identify predict`: predicts the displacement for a drive from a table, the lines of a leg or a spec, and compares it with a measured one if available.
 
 use crate::drawing::wrote;
-use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use super::cause::account;
@@ -93,12 +92,11 @@ fn csv(prediction: &Prediction) -> String {
     let mut text = String::from("time_s,drive_V,displacement_um");
     text += if measured.is_some() { ",measured_um,error_um\n" } else { "\n" };
     for (k, y) in prediction.displacement.iter().enumerate() {
-        // Writing to a String cannot fail.
-        let _ = write!(text, "{:?},{:?},{:?}", prediction.time[k], prediction.drive[k], y * 1e6);
-        let _ = match measured {
-            Some(measured) => writeln!(text, ",{:?},{:?}", measured[k] * 1e6, (measured[k] - y) * 1e6),
-            None => writeln!(text),
-        };
+        text += &format!("{:?},{:?},{:?}", prediction.time[k], prediction.drive[k], y * 1e6);
+        if let Some(measured) = measured {
+            text += &format!(",{:?},{:?}", measured[k] * 1e6, (measured[k] - y) * 1e6);
+        }
+        text.push('\n');
     }
     text
 }
@@ -128,17 +126,15 @@ impl Outcome for IdentificationResult<Prediction> {
         let report = &self.report;
         let mut text = format!("{}: {}\n", report.record, summary(report));
         let (delay, skipped) = (report.dead_time * 1e3, &report.samples_skipped);
-        let _ = write!(
-            text,
+        text += &format!(
             "  displacement delayed by {delay:.3} ms relative to the drive column; {skipped} samples before the drive moves are ignored"
         );
         if let Some(inertia) = report.inertia {
             let Inertia { mode: Mode { frequency, damping }, gain } = inertia;
-            let _ =
-                write!(text, "\n  mode at {frequency:.1} Hz, damping ratio {damping:.4}, gain {:.5} µm/V", gain * 1e6);
+            text += &format!("\n  mode at {frequency:.1} Hz, damping ratio {damping:.4}, gain {:.5} µm/V", gain * 1e6);
         }
         if report.compared.is_none() && report.samples_clipped > 0 {
-            let _ = write!(text, "; {} samples clamped to the table's range", report.samples_clipped);
+            text += &format!("; {} samples clamped to the table's range", report.samples_clipped);
         }
         text + "\n" + &self.files
     }

@@ -1,7 +1,6 @@
 //! `specgen identify rate`: records at several rates in; a comparison of rate-dependent models and spec lines out.
 
 use crate::drawing::wrote;
-use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use super::{Bench, IdentificationResult, MeasuredKeys, refused};
@@ -107,7 +106,7 @@ fn write(output: &Path, identified: &RateIdentification) -> Result<Vec<PathBuf>,
         }
         let block = spec_lines(*option, model, identified.report.held, &table, &rate_table);
         let prefix = if *option == best { "" } else { "# " };
-        let _ = writeln!(lines, "\n# {}", option.name());
+        lines += &format!("\n# {}\n", option.name());
         lines.extend(block.lines().map(|line| format!("{prefix}{line}\n")));
     }
     lines += &format!("\n{}", MeasuredKeys::of(&keys(&identified.report), simulated).text());
@@ -119,19 +118,17 @@ fn write(output: &Path, identified: &RateIdentification) -> Result<Vec<PathBuf>,
 
 fn table(report: &RateReport) -> String {
     let mut text = String::new();
-    // Writing to a String cannot fail.
     for record in &report.records {
         let (name, frequency, speed) = (&record.record, record.frequency_text(), record.speed);
         let (samples, range, noise) = (record.samples, record.range * 1e6, record.noise_percent);
-        let _ = writeln!(
-            text,
-            "{name}: {frequency} curves, median {speed:.0} V/s, {samples} samples, range {range:.3} µm, noise {noise:.3} % of it"
+        text += &format!(
+            "{name}: {frequency} curves, median {speed:.0} V/s, {samples} samples, range {range:.3} µm, noise {noise:.3} % of it\n"
         );
     }
     if let Some(held) = &report.hold_out {
-        let _ = writeln!(text, "{}: held out of all fits", held.record);
+        text += &format!("{}: held out of all fits\n", held.record);
     }
-    let _ = writeln!(text, "\nrms error in % of the range, grid {}", report.grid);
+    text += &format!("\nrms error in % of the range, grid {}\n", report.grid);
     // Nine characters per record, twice; the last column exists only if a record was held out.
     let width = 9 * report.records.len();
     let held = if report.hold_out.is_some() { "  held out" } else { "" };
@@ -160,39 +157,36 @@ fn table(report: &RateReport) -> String {
             }
             _ => format!("; creep {}", creep.join(", ")),
         };
-        let _ = writeln!(text, "{}: dead time {:.3} ms{creep}", option.option.name(), option.dead_time * 1e3);
+        text += &format!("{}: dead time {:.3} ms{creep}\n", option.option.name(), option.dead_time * 1e3);
     }
     for (option, period) in report.options.iter().filter_map(|o| Some((o.option, o.period?))) {
         let when = match period > 0.0 {
             true => format!("at periods of {:.3} ms or longer; `specgen check` refuses shorter ones", period * 1e3),
             false => "at any period".to_owned(),
         };
-        let _ = writeln!(text, "{}: invertible by a controller {when}", option.name());
+        text += &format!("{}: invertible by a controller {when}\n", option.name());
     }
     if let Some(ring) = report.ring {
         let gain = report.options.iter().find_map(|option| option.inertia).map_or(0.0, |inertia| inertia.gain);
         let coarse = if report.grid < FINE_GRID { "; too large on this coarse grid" } else { "" };
         let (frequency, damping, gain) = (ring.mode.frequency, ring.mode.damping, gain * 1e6);
-        let _ = writeln!(
-            text,
-            "mode: {frequency:.1} Hz, damping ratio {damping:.4}, gain {gain:.5} µm/V (slope after a reversal{coarse})"
+        text += &format!(
+            "mode: {frequency:.1} Hz, damping ratio {damping:.4}, gain {gain:.5} µm/V (slope after a reversal{coarse})\n"
         );
         if let Some([frequency, amplitude]) = ring.at_first {
             let (first, last_frequency, last) = (amplitude * 1e6, ring.mode.frequency, ring.amplitude * 1e6);
-            let _ = writeln!(
-                text,
-                "its frequency by amplitude: {frequency:.1} Hz at {first:.3} µm, {last_frequency:.1} Hz at {last:.3} µm"
+            text += &format!(
+                "its frequency by amplitude: {frequency:.1} Hz at {first:.3} µm, {last_frequency:.1} Hz at {last:.3} µm\n"
             );
         }
     }
     if report.held > 0.0 {
-        let _ = writeln!(
-            text,
-            "{:.3} ms of each dead time is the hold of the commands; the spec lines contain the rest",
+        text += &format!(
+            "{:.3} ms of each dead time is the hold of the commands; the spec lines contain the rest\n",
             report.held * 1e3
         );
     }
-    let _ = writeln!(text, "{}", report.verdict.text);
-    let _ = writeln!(text, "lowest error at rates not fitted to: {}", report.verdict.best.name());
+    text += &format!("{}\n", report.verdict.text);
+    text += &format!("lowest error at rates not fitted to: {}\n", report.verdict.best.name());
     text
 }

@@ -1,7 +1,5 @@
 //! `specgen identify RUN.rec --spec SPEC`: refits gain, delay and cubic term of each leg of a platform from a recorded
 //! run, names the legs that no longer match their model, and writes six separate tables.
-
-use std::fmt::Write as _;
 use std::path::Path;
 
 use serde::Serialize;
@@ -31,7 +29,6 @@ const ADVICE: &str = "record at least a second of a slow wave on all axes, in cl
                       `specgen sim SPEC --record run.rec --seconds 2` simulates";
 
 /// Whether a file is a recorded run. One that cannot be read is not.
-#[must_use]
 pub fn is_recorded_run(path: &Path) -> bool {
     use std::io::Read as _;
     let mut start = [0; FILE_MAGIC.len()];
@@ -193,7 +190,7 @@ impl Refits {
             if !differing.is_empty() {
                 let held = found.differs()[0] && !found.cubic.accepted;
                 let assumed = if held { ", cubic term assumed unchanged" } else { "" };
-                let _ = writeln!(text, "leg {leg}: {} since identification{assumed}; refit", differing.join(", "));
+                text += &format!("leg {leg}: {} since identification{assumed}; refit\n", differing.join(", "));
             }
         }
         if text.is_empty() {
@@ -240,11 +237,8 @@ impl Refits {
                 ),
             };
             let numbers: Vec<String> = legs.iter().map(|(leg, _)| leg.to_string()).collect();
-            let _ = writeln!(
-                text,
-                "{name} of leg {}: not determined by this run, kept ({known}). {fix}",
-                numbers.join(", "),
-            );
+            text +=
+                &format!("{name} of leg {}: not determined by this run, kept ({known}). {fix}\n", numbers.join(", "));
         }
         text
     }

@@ -7,7 +7,6 @@ use specgen_studies::paper::printed::TABLE_3;
 use specgen_studies::reproduce::write::convergence_text;
 
 /// The section of a search; `command` reproduces it.
-#[must_use]
 pub fn section(found: &Convergence, command: &str) -> Section {
     let found_any = found.history.iter().any(|generation| generation.best.is_some());
     let charts = if found_any { vec![chart(found)] } else { Vec::new() };
@@ -23,7 +22,6 @@ pub fn section(found: &Convergence, command: &str) -> Section {
 }
 
 /// Best and median cost by generation.
-#[must_use]
 pub fn chart(found: &Convergence) -> Chart {
     let x: Vec<f64> = found.history.iter().map(|generation| generation.evaluations as f64).collect();
     let of = |value: Option<f64>| value.unwrap_or(f64::NAN);

@@ -6,7 +6,7 @@ use host_sim::platform::PlatformScenario;
 use host_sim::platform::rig::{Record, RunOptions};
 use host_sim::platform::scenario::{MACHINING_MODES, select};
 use host_sim::platform::table::MachiningTable;
-use host_sim::trajectory::{PaperPath, PaperPose, Reading};
+use host_sim::trajectory::{PaperPath, PaperPose};
 
 use super::motion::{REFUSED_PATH, TARGETS, change, error};
 use crate::chart::{Axis, Chart, DASHED, EDGE, LINE};
@@ -25,8 +25,7 @@ pub fn section(
 ) -> Result<Section, RunError> {
     let mut sampled = machine.clone();
     sampled.options = RunOptions { record: Record::Samples, ..machine.options.clone() };
-    let trajectory =
-        PaperPose { path: PaperPath::Machining, reading: Reading::Corrected, frequency: MACHINING_FREQUENCY };
+    let trajectory = PaperPose::corrected(PaperPath::Machining, MACHINING_FREQUENCY);
     let mut section = Section::new("machining", "Machining, P against P/F", command)
         .text("The tip presses into a linear work part from the start of the path. Forces and torques act from the part on the platform, about P_C in base axes.");
     let mut table = MachiningTable::default();

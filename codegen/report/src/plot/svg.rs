@@ -1,7 +1,5 @@
 //! Writes SVG text.
 
-use std::fmt::Write as _;
-
 /// How a patch is filled.
 #[derive(Clone, Copy)]
 pub(super) enum Hatch {
@@ -10,7 +8,7 @@ pub(super) enum Hatch {
     Shade(f64),
 }
 
-/// A picture being written. Writing to a String cannot fail, so results of `write!` are ignored.
+/// A picture being written.
 pub(super) struct Canvas {
     text: String,
 }
@@ -18,44 +16,37 @@ pub(super) struct Canvas {
 impl Canvas {
     pub(super) fn new(width: f64, height: f64) -> Self {
         let mut text = String::new();
-        let _ = writeln!(
-            text,
-            "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" viewBox=\"0 0 {width} {height}\" font-family=\"sans-serif\">"
+        text += &format!(
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" viewBox=\"0 0 {width} {height}\" font-family=\"sans-serif\">\n"
         );
-        let _ = writeln!(
-            text,
-            "<defs><pattern id=\"hatch\" width=\"7\" height=\"7\" patternTransform=\"rotate(45)\" patternUnits=\"userSpaceOnUse\"><rect width=\"7\" height=\"7\" fill=\"#fff4e5\"/><path d=\"M0 0V7\" stroke=\"#d9730d\" stroke-width=\"2.4\"/></pattern></defs>"
-        );
-        let _ = writeln!(text, "<rect width=\"{width}\" height=\"{height}\" fill=\"#fff\"/>");
+        text += "<defs><pattern id=\"hatch\" width=\"7\" height=\"7\" patternTransform=\"rotate(45)\" patternUnits=\"userSpaceOnUse\"><rect width=\"7\" height=\"7\" fill=\"#fff4e5\"/><path d=\"M0 0V7\" stroke=\"#d9730d\" stroke-width=\"2.4\"/></pattern></defs>\n";
+        text += &format!("<rect width=\"{width}\" height=\"{height}\" fill=\"#fff\"/>\n");
         Self { text }
     }
 
     pub(super) fn text(&mut self, x: f64, y: f64, size: f64, anchor: &str, color: &str, text: &str) {
-        let _ = writeln!(
-            self.text,
-            "<text x=\"{x:.1}\" y=\"{y:.1}\" font-size=\"{size}\" text-anchor=\"{anchor}\" fill=\"{color}\">{}</text>",
+        self.text += &format!(
+            "<text x=\"{x:.1}\" y=\"{y:.1}\" font-size=\"{size}\" text-anchor=\"{anchor}\" fill=\"{color}\">{}</text>\n",
             escaped(text)
         );
     }
 
     /// Vertical text, centred at its position.
     pub(super) fn upright(&mut self, x: f64, y: f64, size: f64, text: &str) {
-        let _ = writeln!(
-            self.text,
-            "<text transform=\"translate({x:.1} {y:.1}) rotate(-90)\" font-size=\"{size}\" text-anchor=\"middle\" fill=\"#222\">{}</text>",
+        self.text += &format!(
+            "<text transform=\"translate({x:.1} {y:.1}) rotate(-90)\" font-size=\"{size}\" text-anchor=\"middle\" fill=\"#222\">{}</text>\n",
             escaped(text)
         );
     }
 
     pub(super) fn clip(&mut self, id: usize, [x, y, w, h]: [f64; 4]) {
-        let _ = writeln!(
-            self.text,
-            "<clipPath id=\"panel{id}\"><rect x=\"{x:.1}\" y=\"{y:.1}\" width=\"{w:.1}\" height=\"{h:.1}\"/></clipPath>"
+        self.text += &format!(
+            "<clipPath id=\"panel{id}\"><rect x=\"{x:.1}\" y=\"{y:.1}\" width=\"{w:.1}\" height=\"{h:.1}\"/></clipPath>\n"
         );
     }
 
     pub(super) fn open_clipped(&mut self, id: usize) {
-        let _ = writeln!(self.text, "<g clip-path=\"url(#panel{id})\">");
+        self.text += &format!("<g clip-path=\"url(#panel{id})\">\n");
     }
 
     pub(super) fn close(&mut self) {
@@ -63,17 +54,15 @@ impl Canvas {
     }
 
     pub(super) fn frame(&mut self, [x, y, w, h]: [f64; 4]) {
-        let _ = writeln!(
-            self.text,
-            "<rect x=\"{x:.1}\" y=\"{y:.1}\" width=\"{w:.1}\" height=\"{h:.1}\" fill=\"none\" stroke=\"#333\"/>"
+        self.text += &format!(
+            "<rect x=\"{x:.1}\" y=\"{y:.1}\" width=\"{w:.1}\" height=\"{h:.1}\" fill=\"none\" stroke=\"#333\"/>\n"
         );
     }
 
     /// A grid line.
     pub(super) fn rule(&mut self, a: [f64; 2], b: [f64; 2]) {
-        let _ = writeln!(
-            self.text,
-            "<path d=\"M{:.1} {:.1}L{:.1} {:.1}\" stroke=\"#000\" stroke-opacity=\"0.12\"/>",
+        self.text += &format!(
+            "<path d=\"M{:.1} {:.1}L{:.1} {:.1}\" stroke=\"#000\" stroke-opacity=\"0.12\"/>\n",
             a[0], a[1], b[0], b[1]
         );
     }
@@ -84,7 +73,7 @@ impl Canvas {
         let mut pen = 'M';
         for p in points {
             if p[0].is_finite() && p[1].is_finite() {
-                let _ = write!(path, "{pen}{:.1} {:.1}", p[0], p[1]);
+                path += &format!("{pen}{:.1} {:.1}", p[0], p[1]);
                 pen = 'L';
             } else {
                 pen = 'M';
@@ -94,9 +83,8 @@ impl Canvas {
             return;
         }
         let dash = if dashed { " stroke-dasharray=\"7 4\"" } else { "" };
-        let _ = writeln!(
-            self.text,
-            "<path d=\"{path}\" fill=\"none\" stroke=\"{color}\" stroke-width=\"{width}\" stroke-linejoin=\"round\"{dash}/>"
+        self.text += &format!(
+            "<path d=\"{path}\" fill=\"none\" stroke=\"{color}\" stroke-width=\"{width}\" stroke-linejoin=\"round\"{dash}/>\n"
         );
     }
 
@@ -104,12 +92,11 @@ impl Canvas {
         let mut path = String::new();
         for p in points.iter().filter(|p| p[0].is_finite() && p[1].is_finite()) {
             // A zero-length line with round ends is a dot; thousands of them form one element.
-            let _ = write!(path, "M{:.1} {:.1}h0", p[0], p[1]);
+            path += &format!("M{:.1} {:.1}h0", p[0], p[1]);
         }
         if !path.is_empty() {
-            let _ = writeln!(
-                self.text,
-                "<path d=\"{path}\" fill=\"none\" stroke=\"{color}\" stroke-width=\"{}\" stroke-linecap=\"round\"/>",
+            self.text += &format!(
+                "<path d=\"{path}\" fill=\"none\" stroke=\"{color}\" stroke-width=\"{}\" stroke-linecap=\"round\"/>\n",
                 2.0 * radius
             );
         }
@@ -123,8 +110,7 @@ impl Canvas {
                 format!("rgb({},{},{})", part(224.0), part(160.0), part(87.0))
             }
         };
-        let _ =
-            writeln!(self.text, "<rect x=\"{x:.2}\" y=\"{y:.2}\" width=\"{w:.2}\" height=\"{h:.2}\" fill=\"{fill}\"/>");
+        self.text += &format!("<rect x=\"{x:.2}\" y=\"{y:.2}\" width=\"{w:.2}\" height=\"{h:.2}\" fill=\"{fill}\"/>\n");
     }
 
     pub(super) fn finish(mut self) -> String {

@@ -1,7 +1,5 @@
 //! Results of a study as text, JSON and CSV.
 
-use std::fmt::Write as _;
-
 use crate::chart::{Axis, Chart, DOTS};
 use host_sim::coverage::Coverage;
 use serde::Serialize;
@@ -228,29 +226,28 @@ impl<'a> StudyResult<'a> {
                 let mut out = format!("{:.2} nm rms, {:.1} nm peak", f.error_nm, f.peak_nm);
                 if self.work.platform {
                     let (rms, peak) = (f.orientation_nrad, f.orientation_peak_nrad);
-                    let _ = write!(out, ", {rms:.1} nrad rms, {peak:.1} nrad peak");
+                    out += &format!(", {rms:.1} nrad rms, {peak:.1} nrad peak");
                 }
-                let _ = write!(out, ", over {}", f.coverage.brief());
+                out += &format!(", over {}", f.coverage.brief());
                 if let Some(LearningFigures { error_nm, passes, grew, coverage }) = f.learned {
-                    let _ =
-                        write!(out, ", {error_nm:.2} nm after learning from {passes} passes over {}", coverage.brief());
+                    out += &format!(", {error_nm:.2} nm after learning from {passes} passes over {}", coverage.brief());
                     out.push_str(if grew { ", then diverged" } else { "" });
                 }
                 if f.limited_percent > 0.0 {
-                    let _ = write!(out, ", {:.2} % of ticks at a limit", f.limited_percent);
+                    out += &format!(", {:.2} % of ticks at a limit", f.limited_percent);
                 }
                 if f.fault_ticks > 0 {
-                    let _ = write!(out, ", {} ticks with a fault (status {:#x})", f.fault_ticks, f.fault_bits);
+                    out += &format!(", {} ticks with a fault (status {:#x})", f.fault_ticks, f.fault_bits);
                 }
                 out
             }
             Outcome::Diverged { time, reason, limited_percent } => {
                 let mut out = format!("diverged: {reason}");
                 if let Some(time) = time {
-                    let _ = write!(out, " after {time:.4} s");
+                    out += &format!(" after {time:.4} s");
                 }
                 if *limited_percent > 0.0 {
-                    let _ = write!(out, ", a leg at its limit in {limited_percent:.1} % of the preceding ticks");
+                    out += &format!(", a leg at its limit in {limited_percent:.1} % of the preceding ticks");
                 }
                 out
             }
@@ -288,18 +285,16 @@ impl<'a> StudyResult<'a> {
         out.push('\n');
         for (member, outcome) in self.runs {
             let diverged = outcome.figures().is_none();
-            let _ = write!(out, "{},{},{},{diverged},", member.name, member.seed, member.drawn);
+            out += &format!("{},{},{},{diverged},", member.name, member.seed, member.drawn);
             if let Outcome::Diverged { time: Some(time), .. } = outcome {
-                let _ = write!(out, "{time}");
+                out += &format!("{time}");
             }
             for row in self.rows() {
-                let _ = match outcome.figures() {
-                    Some(figures) => write!(out, ",{}", (row.of)(figures)),
-                    None => write!(out, ","),
-                };
+                out.push(',');
+                out.extend(outcome.figures().map(|figures| (row.of)(figures).to_string()));
             }
             let d = &member.deviation;
-            let _ = write!(out, ",{},{},{},{}", d.mass, d.damping, d.noise, d.delay_ticks);
+            out += &format!(",{},{},{},{}", d.mass, d.damping, d.noise, d.delay_ticks);
             out.extend(EACH.into_iter().flat_map(|factor| by_leg(d, factor)).map(|value| format!(",{value}")));
             let figures = outcome.figures();
             let mut measured = vec![figures.map(|figures| figures.coverage)];
@@ -307,10 +302,8 @@ impl<'a> StudyResult<'a> {
                 measured.push(figures.and_then(|figures| Some(figures.learned?.coverage)));
             }
             for coverage in measured {
-                let _ = match coverage {
-                    Some(Coverage { seconds, path_seconds }) => write!(out, ",{seconds},{path_seconds}"),
-                    None => write!(out, ",,"),
-                };
+                let both = coverage.map(|Coverage { seconds, path_seconds }| format!(",{seconds},{path_seconds}"));
+                out += both.as_deref().unwrap_or(",,");
             }
             out.push('\n');
         }
@@ -328,37 +321,35 @@ impl CommandOutcome for Report<'_> {
     fn text(&self) -> String {
         let (found, mut out) = (&self.found, String::new());
         let drawn = self.runs.iter().filter(|run| run.member.drawn).count();
-        // Writing to a String cannot fail, here and below.
         let (name, trajectory, frequency) = (&self.name, &self.trajectory, self.frequency);
         let (machines, seed, noise) = (self.runs.len(), self.seed, if self.noise { "" } else { ", without noise" });
-        let _ = writeln!(
-            out,
-            "{name}: {trajectory} at {frequency} Hz on {machines} machines, {drawn} of them random (seed {seed}){noise}"
+        out += &format!(
+            "{name}: {trajectory} at {frequency} Hz on {machines} machines, {drawn} of them random (seed {seed}){noise}\n"
         );
         if let Some(coverage) = &self.coverage {
-            let _ = writeln!(out, "each run measured over {coverage}");
+            out += &format!("each run measured over {coverage}\n");
         }
         if let Some(Lessons { passes, band: [low, high] }) = found.work.learning {
             let over = found.learned_over();
-            let _ = writeln!(out, "learning from {passes} passes on each, {low:.1} to {high:.0} Hz{over}");
+            out += &format!("learning from {passes} passes on each, {low:.1} to {high:.0} Hz{over}\n");
         }
         out.push_str("varied, as factors on spec values:\n");
         for one in self.factors.iter() {
             let [low, high] = one.range;
             let each = if one.factor.of_each_leg() { ", independent for each leg of a random machine" } else { "" };
-            let _ = writeln!(out, "  {:<12}{low:>7.3} to {high:<7.3}({}{each})", one.factor.name(), one.origin);
+            out += &format!("  {:<12}{low:>7.3} to {high:<7.3}({}{each})\n", one.factor.name(), one.origin);
         }
         match found.runs {
             [(member, outcome)] if found.alone => {
-                let _ = writeln!(out, "{}: {}\n{}", member.name, found.figures(outcome), described(&member.deviation));
+                out += &format!("{}: {}\n{}\n", member.name, found.figures(outcome), described(&member.deviation));
             }
             _ => self.figures(&mut out),
         }
         let bound = self.diverged_above_nm;
-        let _ = writeln!(out, "diverged (error above {bound:.0} nm): {} of {}", self.diverged, self.runs.len());
+        out += &format!("diverged (error above {bound:.0} nm): {} of {}\n", self.diverged, self.runs.len());
         if self.gate.complete {
             if self.gate.reasons.is_empty() {
-                let _ = writeln!(out, "gate: passed ({})", found.gate_conditions());
+                out += &format!("gate: passed ({})\n", found.gate_conditions());
             }
             out.extend(self.gate.reasons.iter().map(|reason| format!("gate: {reason}\n")));
         }
@@ -383,14 +374,13 @@ impl Report<'_> {
             row(out, &columns, &[&line.row.name, &nominal, &a, &b, &c, &d, &corners]);
         }
         out.push_str("corners, with six equal legs:\n");
-        // Writing to a String cannot fail, here and below.
         for run in self.runs.iter().filter(|run| !run.member.drawn) {
-            let _ = writeln!(out, "  {:<18}{}", run.member.name, self.found.figures(run.outcome));
+            *out += &format!("  {:<18}{}\n", run.member.name, self.found.figures(run.outcome));
         }
         for line in self.table.iter().filter(|line| line.row.judged) {
             let Some(Worst { name, replay, run: (member, outcome) }) = &line.worst else { continue };
-            let _ = writeln!(out, "worst {}: {name}: {}", line.row.name, self.found.figures(outcome));
-            let _ = writeln!(out, "{}\n  replay: {replay}", described(&member.deviation));
+            *out += &format!("worst {}: {name}: {}\n", line.row.name, self.found.figures(outcome));
+            *out += &format!("{}\n  replay: {replay}\n", described(&member.deviation));
         }
     }
 }
@@ -417,9 +407,9 @@ fn described(d: &Deviation) -> String {
     for factor in EACH {
         let values = by_leg(d, factor);
         if values.iter().all(|value| value.to_bits() == values[0].to_bits()) {
-            let _ = write!(out, ", {factor} {:.3}", values[0]);
+            out += &format!(", {factor} {:.3}", values[0]);
         } else {
-            let _ = write!(out, "\n    {factor:<11} by leg", factor = factor.name());
+            out += &format!("\n    {factor:<11} by leg", factor = factor.name());
             out.extend(values.iter().map(|value| format!(" {value:.3}")));
         }
     }

@@ -1,8 +1,6 @@
 //! `specgen sim` for a spec without `[control]`: a sweep of its own legs with every law that has weights in the spec, or the
 //! paper's leg experiment, Tables 1 and 2.
 
-use std::fmt::Write as _;
-
 use host_sim::closed_loop::Tracking;
 use host_sim::controller::TickController;
 use host_sim::plant::NoiseParameters;
@@ -239,14 +237,12 @@ impl Outcome for Tables<'_> {
             made.map_or("-".to_owned(), |row| row.coverage.brief())
         });
         row(&mut out, &columns, &[&"over", &a, &b, &c]);
-        // Writing to a String cannot fail, here and below.
-        let _ = writeln!(out, "{name}: slope of Y over q̂, relative to 0.1 Hz (paper's Table 1)");
+        out += &format!("{name}: slope of Y over q̂, relative to 0.1 Hz (paper's Table 1)\n");
         for (index, row) in self.linearity.rows.iter().enumerate() {
             let paper = printed::slope_ratio(index);
             let (hertz, ratio, offset) = (row.frequency_hz, row.gain_ratio, row.offset_um * 1e3);
             let slope = row.relative_slope;
-            let _ =
-                writeln!(out, "  {hertz:>5} Hz  λ {ratio:.4}  offset {offset:>8.1} nm  ratio {slope:.4} ({paper:.4})");
+            out += &format!("  {hertz:>5} Hz  λ {ratio:.4}  offset {offset:>8.1} nm  ratio {slope:.4} ({paper:.4})\n");
         }
         out + self.plot.as_deref().unwrap_or_default()
     }

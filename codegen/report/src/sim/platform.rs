@@ -5,16 +5,15 @@
 //! one nominal record for six legs the inverse model has the error of the legs, which adaptation compensates.
 
 use std::cell::RefCell;
-use std::fmt::Write as _;
 
 use host_sim::closed_loop::RunError;
 use host_sim::controller::TickController;
 use host_sim::coverage::Coverage;
+use host_sim::platform::PlatformScenario;
 use host_sim::platform::rig::{PlatformRun, Record};
 use host_sim::platform::scenario::{FREE_MODES, select, select_at_equal_gains};
 use host_sim::platform::table::{AXES, MachiningRow, MachiningTable, PoseRow, PoseTable};
-use host_sim::platform::{PlatformScenario, WorkPart};
-use host_sim::trajectory::{PaperPath, PaperPose, PoseTarget, PoseTrajectory, Reading};
+use host_sim::trajectory::{PaperPath, PaperPose, PoseTarget, PoseTrajectory};
 use host_sim::word::status_words;
 use serde::Serialize;
 
@@ -29,6 +28,7 @@ use specgen_language::table::{left, right, row};
 use specgen_language::ui::Ui;
 use specgen_runtime::ControlMode;
 use specgen_studies::machine::{self, run_failure};
+use specgen_studies::reproduce::platform::{CASES, MACHINING_FREQUENCY, parts};
 use specgen_studies::runs::{LEG_LIMITED, TrajectoryErrors, selector};
 
 /// Observation time at rest, s.
@@ -38,12 +38,8 @@ const PERIODS: f64 = 4.0;
 const SHORTEST: f64 = 0.2;
 /// Amplitude of a wave relative to the simultaneous reach of all axes.
 const WAVE: f64 = 0.9;
-/// The paper's free motions.
-const CASES: [(&str, PaperPath); 2] = [("case-1", PaperPath::Case1), ("case-2", PaperPath::Case2)];
 /// P, F and P/F of Table 9.
 const MACHINING: [(&str, u32); 3] = [ControlMode::WORDS[0], ControlMode::WORDS[3], ControlMode::WORDS[6]];
-/// Frequency of the machining path, Hz.
-const MACHINING_FREQUENCY: f64 = 1.0;
 /// Refuses options for legs only, and a trajectory that the spec does not have.
 pub(super) fn check(options: &Options, task: &TaskSpace) -> Result<(), Failure> {
     if options.samples.is_some() {
@@ -193,7 +189,7 @@ impl Outcome for Report<'_> {
         let Self { name, mode, seed, .. } = self;
         let mut out =
             format!("{name}, {mode}: simulated machine with tolerances, legs ±10 %, stiffness ±5 % (seed {seed});\n");
-        let _ = writeln!(out, "the controller has {records}");
+        out += &format!("the controller has {records}\n");
         match &self.found {
             Results::Tables { text, .. } => out += text,
             Results::Motions { motions } => out += &table(motions),
@@ -222,7 +218,7 @@ fn table(motions: &[Motion]) -> String {
         .filter_map(|motion| Some(format!("{}: z ±{:.1} µm", motion.name, motion.amplitude? * 1e6)))
         .collect();
     if !waves.is_empty() {
-        let _ = writeln!(out, "waves move all axes at once ({})", waves.join(", "));
+        out += &format!("waves move all axes at once ({})\n", waves.join(", "));
     }
     out
 }
@@ -267,7 +263,7 @@ impl Experiment<'_> {
         for (name, path) in CASES {
             for &frequency in frequencies {
                 self.ui.progress(&format!("Tables 5 to 8: {name} at {frequency} Hz"));
-                let trajectory = PaperPose { path, reading: Reading::Corrected, frequency };
+                let trajectory = PaperPose::corrected(path, frequency);
                 for (mode, word) in FREE_MODES {
                     select_at_equal_gains(self.controller, word).map_err(environment)?;
                     let run = self.scenario.run(self.controller, &trajectory);
@@ -277,9 +273,8 @@ impl Experiment<'_> {
             }
         }
         let mut machining = MachiningTable::default();
-        let trajectory =
-            PaperPose { path: PaperPath::Machining, reading: Reading::Corrected, frequency: MACHINING_FREQUENCY };
-        for (part, work) in [("glass", WorkPart::glass()), ("aluminium", WorkPart::aluminium())] {
+        let trajectory = PaperPose::corrected(PaperPath::Machining, MACHINING_FREQUENCY);
+        for (part, work) in parts() {
             self.ui.progress(&format!("Table 9: machining {part}"));
             for (mode, word) in MACHINING {
                 select(self.controller, word).map_err(environment)?;
@@ -402,10 +397,9 @@ pub fn chart(name: &str, interval: f64, run: &PlatformRun) -> Chart {
 fn csv(motions: &[Motion]) -> String {
     let mut out = String::from("motion,seconds,path_seconds,x_nm,y_nm,z_nm,rx_nrad,ry_nrad,rz_nrad,norm_nm,peak_nm\n");
     for Motion { name, coverage, rms_nano, translation_nm, peak_nm, .. } in motions {
-        // Writing to a String cannot fail, here and below.
-        let _ = write!(out, "{name},{:.6},{:.6}", coverage.seconds, coverage.path_seconds);
+        out += &format!("{name},{:.6},{:.6}", coverage.seconds, coverage.path_seconds);
         out.extend(rms_nano.iter().map(|value| format!(",{value:.4}")));
-        let _ = writeln!(out, ",{translation_nm:.4},{peak_nm:.4}");
+        out += &format!(",{translation_nm:.4},{peak_nm:.4}\n");
     }
     out
 }

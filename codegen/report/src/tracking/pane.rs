@@ -30,7 +30,6 @@ pub struct PlottedRun<'a> {
 
 impl PlottedRun<'_> {
     /// Rms error over all coordinates and ticks, nm.
-    #[must_use]
     pub fn rms_nano(&self) -> f64 {
         let square =
             |[target, pose]: &[[f64; 6]; 2]| target.iter().zip(pose).map(|(a, b)| (a - b) * (a - b)).sum::<f64>() / 6.0;
@@ -39,7 +38,6 @@ impl PlottedRun<'_> {
 }
 
 /// Content of a section about a run.
-#[must_use]
 pub fn pane(run: &PlottedRun) -> Vec<Part> {
     let of = |axis: usize| -> Vec<f64> {
         run.samples.iter().map(|[target, pose]| (target[axis] - pose[axis]) * 1e9).collect()
@@ -129,7 +127,6 @@ pub fn pane(run: &PlottedRun) -> Vec<Part> {
 }
 
 /// Formats with three digits.
-#[must_use]
 pub fn short(value: f64) -> String {
     let size = value.abs();
     if size >= 99.95 {
@@ -142,7 +139,6 @@ pub fn short(value: f64) -> String {
 }
 
 /// Rounds up to 1, 2, 3, 4, 6 or 8 times a power of ten.
-#[must_use]
 pub(crate) fn round_up(value: f64) -> f64 {
     if value <= 0.0 || !value.is_finite() {
         return 1.0;

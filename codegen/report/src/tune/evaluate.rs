@@ -1,7 +1,6 @@
 //! `specgen tune --evaluate`: scores candidates proposed by another program.
 
 use std::collections::BTreeMap;
-use std::fmt::Write as _;
 use std::path::Path;
 
 use host_sim::controller::Controller;
@@ -101,7 +100,6 @@ pub(super) fn run(job: &Job, asked: &[Setting], ui: &Ui) -> Result<(), Failure> 
 impl Outcome for EvaluationReport<'_> {
     fn text(&self) -> String {
         let mut text = String::new();
-        // Writing to a String cannot fail, here and below.
         text.extend(self.parameters.iter().map(|Parameter { name, bounds: [low, high], spec }| {
             format!("{name:<8} {low:.3e} to {high:.3e}, {spec:.3e} in the spec\n")
         }));
@@ -118,7 +116,7 @@ impl Outcome for EvaluationReport<'_> {
                     )
                 }
             };
-            let _ = writeln!(text, "candidate {index}: {score}");
+            text += &format!("candidate {index}: {score}\n");
         }
         text
     }

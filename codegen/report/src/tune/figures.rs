@@ -1,11 +1,10 @@
 //! Results of tuning as text and as JSON.
 
-use std::fmt::Write as _;
-
 use serde::Serialize;
 
 use super::Job;
 use super::start::Starts;
+use crate::tracking::AXES;
 use specgen_compiler::compile::Compilation;
 use specgen_compiler::stability::platform::{Conditions, ModeMargins};
 use specgen_compiler::stability::{LegDynamics, phase_margin, transition};
@@ -17,9 +16,6 @@ use specgen_studies::tuning::feasible::Feasibility;
 use specgen_studies::tuning::relay::Ultimate;
 use specgen_studies::tuning::search::Generation;
 use specgen_studies::tuning::{self, Candidate, Case, Evaluation, Score, Search, Setting, space};
-
-/// Axes in messages.
-const AXES: [&str; 6] = ["x", "y", "z", "θx", "θy", "θz"];
 
 /// A setting and its results on both conditions.
 #[derive(Serialize)]
@@ -145,21 +141,19 @@ impl<'a> Report<'a> {
         for search in &self.searches {
             let (unstable, limited) =
                 search.history.iter().fold((0, 0), |(a, b), one| (a + one.unstable, b + one.limited));
-            // Writing to a String cannot fail, here and below.
             let (name, candidates, runs) = (search.optimiser, search.evaluations, search.runs);
             let seconds = search.runs as f64 * self.seconds;
             let best = search.best.map_or("none".to_owned(), |best| format!("{:.5} µm s²", best.score.cost));
-            let _ = writeln!(
-                text,
-                "{name}: {candidates} candidates, {runs} simulated ({seconds:.0} s of machine time), {unstable} unstable or below the margins, {limited} at a limit; best cost {best}"
+            *text += &format!(
+                "{name}: {candidates} candidates, {runs} simulated ({seconds:.0} s of machine time), {unstable} unstable or below the margins, {limited} at a limit; best cost {best}\n"
             );
         }
         if let Some(ultimate) = self.relay {
             text.push_str("relay test with notch:");
             for (axis, found) in AXES.iter().zip(ultimate) {
-                let _ = match found {
-                    Some(u) => write!(text, "  {axis} {:.2} K at {:.0} Hz", u.gain, 1.0 / u.period),
-                    None => write!(text, "  {axis} none"),
+                *text += &match found {
+                    Some(u) => format!("  {axis} {:.2} K at {:.0} Hz", u.gain, 1.0 / u.period),
+                    None => format!("  {axis} none"),
                 };
             }
             text.push('\n');
@@ -208,15 +202,14 @@ impl<'a> Report<'a> {
         let Margins { gain, phase_degrees, delay_ticks } = self.margins;
         let delay =
             if self.is_platform { format!("{} ticks", or(delay_ticks, "> 5")) } else { "not checked".to_owned() };
-        let _ = writeln!(
-            text,
-            "margins of the result: gain × {}, phase {}°, delay {delay}",
+        *text += &format!(
+            "margins of the result: gain × {}, phase {}°, delay {delay}\n",
             or(gain, "> 30 or up to a weight of 1"),
             phase_degrees.map_or("> 180".to_owned(), |degrees| format!("{degrees:.1}"))
         );
         for parameter in &self.parameters {
             if let Some(value) = parameter.value {
-                let _ = write!(text, "  {} {value:.4e}", parameter.name);
+                *text += &format!("  {} {value:.4e}", parameter.name);
             }
         }
         text.push('\n');

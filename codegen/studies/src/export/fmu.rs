@@ -4,7 +4,6 @@ mod controller;
 mod plant;
 
 use std::collections::BTreeMap;
-use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
 
@@ -207,21 +206,18 @@ impl<'a> Unit<'a> {
                 (_, WordKind::Real) => format!(" start=\"{:?}\"", self.scalar.decode(*start)),
             };
             let kind = if *kind == WordKind::Real { "Real" } else { "Integer" };
-            // Writing to a String cannot fail, here and below.
-            let _ = writeln!(
-                text,
+            text += &format!(
                 "<ScalarVariable name=\"{}\" valueReference=\"{reference}\" causality=\"{causality}\" \
-                 variability=\"{variability}\"{initial}><{kind}{start}/></ScalarVariable>",
-                escaped(name),
+                 variability=\"{variability}\"{initial}><{kind}{start}/></ScalarVariable>\n",
+                escaped(name)
             );
             if *causality == "output" {
                 let index = reference + 1;
-                let _ = writeln!(outputs, "<Unknown index=\"{index}\" dependencies=\"\"/>");
-                let _ = writeln!(first, "<Unknown index=\"{index}\" dependencies=\"{}\"/>", settings.join(" "));
+                outputs += &format!("<Unknown index=\"{index}\" dependencies=\"\"/>\n");
+                first += &format!("<Unknown index=\"{index}\" dependencies=\"{}\"/>\n", settings.join(" "));
             }
         }
-        let _ = write!(
-            text,
+        text += &format!(
             "</ModelVariables>\n<ModelStructure>\n<Outputs>\n{outputs}</Outputs>\n<InitialUnknowns>\n{first}</InitialUnknowns>\n\
              </ModelStructure>\n</fmiModelDescription>\n"
         );

@@ -1,7 +1,5 @@
 //! Text report of a build.
 
-use std::fmt::Write as _;
-
 use super::{BuildResult, time};
 use specgen_language::outcome::Outcome;
 use specgen_language::table::{left, right, row};
@@ -19,16 +17,15 @@ impl Outcome for BuildResult {
         let mut out = format!("{name} → {artifact} for {board} (f{bits}, digest {digest})\n");
         // Writing to a String cannot fail, here and below.
         if let Some(compiler) = &self.compiler {
-            let _ = writeln!(out, "  compiler      {compiler}");
+            out += &format!("  compiler      {compiler}\n");
         }
         if let Some(used) = &self.used {
             self.usage(used, &mut out);
         }
         if let Some(stack) = &self.stack {
             let [startup, running, reserved] = [stack.startup, stack.running, stack.reserved].map(group);
-            let _ = writeln!(
-                out,
-                "  stack         {startup} of {reserved} bytes at startup, {running} with tick and nested interrupts"
+            out += &format!(
+                "  stack         {startup} of {reserved} bytes at startup, {running} with tick and nested interrupts\n"
             );
         }
         if let Some(estimate) = self.measurement.as_ref().and_then(|m| m.time.as_ref()) {
@@ -41,7 +38,7 @@ impl Outcome for BuildResult {
             out.push_str(&checked(checks));
         }
         if let Some(m) = self.measurement.as_ref().filter(|m| m.first_difference.is_none()) {
-            let _ = writeln!(out, "  host and {} agree in every bit over {} ticks", m.machine, group(m.ticks));
+            out += &format!("  host and {} agree in every bit over {} ticks\n", m.machine, group(m.ticks));
         }
         out.extend(self.notes.iter().map(|note| format!("  note: {note}\n")));
         out
@@ -53,17 +50,17 @@ impl BuildResult {
     fn usage(&self, used: &ImageUsage, out: &mut String) {
         let of = |budget: Option<u64>| budget.map_or(String::new(), |budget| format!(" of {}", group(budget)));
         let limits = &self.limits.budget;
-        let _ = writeln!(out, "  flash         {}{} bytes", group(used.flash), of(limits.flash));
+        *out += &format!("  flash         {}{} bytes\n", group(used.flash), of(limits.flash));
         let ram = match used.ram {
             Some(ram) => format!("{}{} bytes including the tick's stack", group(ram), of(limits.ram)),
             None if used.stack.is_none() => "unknown: the tick's stack is unbounded".to_owned(),
             None => "not measured: the sizes of State and settings are known only at run time".to_owned(),
         };
-        let _ = writeln!(out, "  RAM           {ram}");
+        *out += &format!("  RAM           {ram}\n");
         let bound = used
             .stack
             .map_or("unbounded".to_owned(), |bytes| format!("at most {}{} bytes", group(bytes), of(limits.stack)));
-        let _ = writeln!(out, "  tick stack    {bound} (static)");
+        *out += &format!("  tick stack    {bound} (static)\n");
         if let Some(instructions) = used.instructions {
             let counted = self.measurement.as_ref().map_or(String::new(), |m| {
                 format!(
@@ -72,7 +69,7 @@ impl BuildResult {
                 )
             });
             let of = of(limits.instructions);
-            let _ = writeln!(out, "  instructions  {}{of} per tick, mean{counted}", group(instructions));
+            *out += &format!("  instructions  {}{of} per tick, mean{counted}\n", group(instructions));
         }
     }
 }
@@ -104,16 +101,16 @@ pub fn sections(size: &Size) -> String {
     let mut out = String::new();
     if let Some(identity) = &size.identity {
         let target = size.target.map_or(String::new(), |target| format!(", for {target}"));
-        let _ = writeln!(out, "  made by {identity}{target}");
+        out += &format!("  made by {identity}{target}\n");
     }
     if !size.assumed.is_empty() {
-        let _ = writeln!(out, "  assumed: {}", size.assumed.join(", "));
+        out += &format!("  assumed: {}\n", size.assumed.join(", "));
     }
     let recorder = match size.recorder() {
         0 => String::new(),
         bytes => format!(", and {} bytes for the recorder", group(bytes)),
     };
-    let _ = writeln!(out, "  flash {} bytes, RAM {} bytes static{recorder}", group(size.flash()), group(size.ram()));
+    out += &format!("  flash {} bytes, RAM {} bytes static{recorder}\n", group(size.flash()), group(size.ram()));
     for section in &size.sections {
         let place = match (section.flash, section.ram) {
             (true, true) => "flash and RAM",
@@ -121,10 +118,10 @@ pub fn sections(size: &Size) -> String {
             _ => "RAM",
         };
         let (name, address, bytes) = (&section.name, section.address, group(section.bytes));
-        let _ = writeln!(out, "    {name:<22} {address:#010x} {bytes:>10} bytes {place}");
+        out += &format!("    {name:<22} {address:#010x} {bytes:>10} bytes {place}\n");
     }
     for (name, bytes) in size.variables.iter().take(LISTED) {
-        let _ = writeln!(out, "    variable {name}: {} bytes", group(*bytes));
+        out += &format!("    variable {name}: {} bytes\n", group(*bytes));
     }
     out
 }
@@ -132,9 +129,8 @@ pub fn sections(size: &Size) -> String {
 /// Results of the tick checks.
 pub fn checked(checks: &TickChecks) -> String {
     let mut out = String::new();
-    let _ = writeln!(
-        out,
-        "  {} reaches {} functions, {} bytes of code; {}",
+    out += &format!(
+        "  {} reaches {} functions, {} bytes of code; {}\n",
         checks.tick,
         checks.functions,
         group(checks.code),
@@ -146,7 +142,7 @@ pub fn checked(checks: &TickChecks) -> String {
     );
     let path: Vec<String> = checks.path.iter().map(|(name, frame)| format!("{name} {frame}")).collect();
     let bound = checks.stack.map_or("unbounded".to_owned(), |bytes| format!("at most {} bytes", group(bytes)));
-    let _ = writeln!(out, "  stack: {bound}: {}", path.join(" → "));
+    out += &format!("  stack: {bound}: {}\n", path.join(" → "));
     out.extend(checks.faults.iter().map(|fault| format!("  FAULT {}\n", fault.text)));
     out
 }

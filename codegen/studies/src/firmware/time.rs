@@ -1,7 +1,5 @@
 //! Compares the modelled time of a board's tick with its period; text report.
 
-use std::fmt::Write as _;
-
 use specgen_compiler::compile::Compilation;
 use specgen_language::diagnostic::{Diagnostic, codes};
 use specgen_toolchain::time::Estimate;
@@ -57,7 +55,7 @@ pub fn text(estimate: &Estimate) -> String {
             _ => String::new(),
         };
         // Writing to a String cannot fail.
-        let _ = writeln!(out, "    {name:<22} {time:>6.1} us{more}");
+        out += &format!("    {name:<22} {time:>6.1} us{more}\n");
     }
     out
 }

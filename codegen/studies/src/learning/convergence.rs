@@ -95,7 +95,6 @@ pub struct Convergence {
 
 impl Convergence {
     /// Ticks between knots of a table that can hold what Q passes; `period` in s.
-    #[must_use]
     pub fn spacing(&self, period: f64) -> u32 {
         spacing(self.band[1], period)
     }
@@ -157,14 +156,12 @@ impl Convergence {
     }
 
     /// |Q| at a frequency, Hz.
-    #[must_use]
     pub fn passed(&self, hertz: f64) -> f64 {
         passed(self.band, hertz)
     }
 
     /// Frequency (Hz) up to which learning with a measured T is worth trying: the requested one, or beyond the unknown structural modes that
     /// ring first.
-    #[must_use]
     pub fn reach(&self) -> f64 {
         let beyond = REACH_STEP * libm::ceil(REACH * self.unknown_from / REACH_STEP);
         if beyond > self.requested { beyond } else { self.requested }
@@ -188,7 +185,6 @@ impl Convergence {
 
 impl Learnable {
     /// The loop of a spec with `[control]` in its initial mode; `None` for six legs.
-    #[must_use]
     pub fn of(compiled: &Compilation) -> Option<Self> {
         let (model, task) = (&compiled.model, compiled.model.task_space.as_ref()?);
         let design = compiled.design.as_ref()?;
@@ -208,7 +204,6 @@ impl Learnable {
     }
 
     /// Natural frequencies of its modes, rad/s.
-    #[must_use]
     pub fn modes(&self) -> [f64; 6] {
         self.closed_loop.basis.frequencies
     }
@@ -266,7 +261,6 @@ impl Learnable {
 
     /// The highest f_c up to `requested` (Hz) at which learning converges on every machine within `factors`, or for a measured T within its
     /// uncertainty; `None` if it converges at no frequency.
-    #[must_use]
     pub fn convergence(&self, factors: &Factors, requested: f64) -> Option<Convergence> {
         if let Some(response) = &self.measured {
             return Some(self.extended_downwards(Convergence::measured(response, requested)?, factors, requested));

@@ -67,7 +67,6 @@ pub struct Excitation {
 
 impl Excitation {
     /// For learning up to a frequency (Hz), within the `limit` of a correction; `noise` is that of a gauge, rms. Both in m.
-    #[must_use]
     pub fn new(learnable: &Learnable, motion: &Motion, bandwidth: f64, [limit, noise]: [f64; 2]) -> Self {
         let period = learnable.closed_loop.period;
         let spacing = spacing(bandwidth, period);
@@ -166,13 +165,11 @@ pub struct SweepSpectra {
 
 impl SweepSpectra {
     /// T with its standard error, for learning; `names` are the digest of the spec and the machine.
-    #[must_use]
     pub fn response(&self, names: [&str; 2]) -> Response {
         Response::new(names, self.bins(WIDTH))
     }
 
     /// The same in bins as narrow as lightly damped modes of a structure.
-    #[must_use]
     pub fn narrow(&self) -> Vec<Bin> {
         self.bins(NARROW)
     }

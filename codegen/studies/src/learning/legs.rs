@@ -60,7 +60,6 @@ impl HystereticLegs {
     }
 
     /// What would have to be added to the requests of a pass (modal coordinates, m) so that linear legs move as these do, tick by tick.
-    #[must_use]
     pub fn excess(&self, requests: &[[f64; 6]]) -> Vec<[f64; 6]> {
         let mut legs = Self { believed: self.believed.clone(), real: self.real.clone(), ..*self };
         let mut pass = || -> Vec<[f64; 6]> {

@@ -97,13 +97,11 @@ impl RepeatableMachine for Bench<'_> {
 }
 
 /// Timing of a pass: its ticks, the spacing of its knots in ticks, and the number of its trajectory.
-#[must_use]
 pub fn pass_timing(motion: &Motion, spacing: u32, trajectory: u32) -> Course {
     Course { spacing, before: motion.scored.start as u32, ticks: motion.corrected as u32, trajectory }
 }
 
 /// The error of each tick, m and rad: the recorded error of its knot, the same over `spacing` ticks.
-#[must_use]
 pub fn error_by_tick(errors: &[Knot], spacing: u32, ticks: usize) -> Vec<[f64; 6]> {
     let metres = |knot: &Knot| knot.map(|value| f64::from(value) * UNIT);
     errors.iter().flat_map(|knot| std::iter::repeat_n(metres(knot), spacing as usize)).take(ticks).collect()

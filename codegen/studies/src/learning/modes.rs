@@ -24,7 +24,6 @@ pub struct ModeMeasurement {
 
 impl Learnable {
     /// The measured response of each mode.
-    #[must_use]
     pub fn mode_measurements(&self, response: &Response) -> [ModeMeasurement; 6] {
         let frequencies: Vec<f64> = response.bins.iter().map(|bin| bin.hertz).collect();
         let model = self.nominal(&frequencies);

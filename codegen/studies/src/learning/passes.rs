@@ -55,7 +55,6 @@ impl Pass {
     }
 
     /// Whether the correction was limited.
-    #[must_use]
     pub fn limited(&self) -> bool {
         self.status & CORRECTION_LIMITED != 0
     }
@@ -76,7 +75,6 @@ fn measured_nm(errors: &[[f64; 6]], motion: &Motion) -> f64 {
 }
 
 /// Rms error of the translation as a norm, nm, from the recorded errors of a pass.
-#[must_use]
 pub fn measured_translation_nm(errors: &[Knot]) -> f64 {
     let squares = errors.iter().flat_map(|knot| &knot[..3]).map(|value| f64::from(*value) * f64::from(*value));
     libm::sqrt(squares.sum::<f64>() / errors.len() as f64) * UNIT * 1e9
@@ -134,7 +132,6 @@ impl LearningResult {
     }
 
     /// Whether learning ended because the error grew.
-    #[must_use]
     pub fn grew(&self) -> bool {
         self.ending == Ending::Growth
     }

@@ -58,7 +58,6 @@ impl Plan {
     /// A plan for passes of a motion on a device that can store `capacity` knots of corrections and as many of errors.
     /// Uses the highest f_c up to that of `convergence` that fits. `None` if learning converges at no frequency on every machine within
     /// `factors`.
-    #[must_use]
     pub fn new(
         learnable: &Learnable,
         motion: &Motion,
@@ -97,7 +96,6 @@ impl Plan {
     }
 
     /// The device's next correction, computed by its own kernel from the one played and the recorded errors. `None` if it would refuse.
-    #[must_use]
     pub fn next(&self, played: &[Knot], errors: &[Knot]) -> Option<Vec<Knot>> {
         let knots = errors.len();
         let mut table = played.to_vec();

@@ -34,13 +34,11 @@ pub fn takes_correction(compiled: &Compilation) -> Result<&TaskSpace, Failure> {
 }
 
 /// Largest permitted `control.correction`, m.
-#[must_use]
 pub fn largest_correction(model: &Model) -> f64 {
     CORRECTION_SHARE * model.actuator.stroke
 }
 
 /// How to avoid that a correction is limited: from the limit that suffices, that of the spec, and the largest permitted, m.
-#[must_use]
 pub fn larger_limit([sufficient, limit, most]: [f64; 3]) -> String {
     // A correction was limited, so a larger limit is needed, whatever was computed.
     let least = if sufficient > limit { sufficient } else { LARGER * limit };

@@ -42,14 +42,12 @@ pub struct Response {
 
 impl Response {
     /// For the digest of a spec and a machine.
-    #[must_use]
     pub fn new([digest, machine]: [&str; 2], bins: Vec<Bin>) -> Self {
         let [digest, machine] = [digest, machine].map(str::to_owned);
         Self { format: FORMAT.to_owned(), digest, machine, bins }
     }
 
     /// The file content: JSON, one frequency per line.
-    #[must_use]
     pub fn to_json(&self) -> String {
         let head =
             serde_json::json!({ "format": self.format, "digest": self.digest, "machine": self.machine }).to_string();
@@ -93,7 +91,6 @@ impl Response {
     }
 
     /// T at a frequency, Hz, interpolated linearly; constant beyond the measured range.
-    #[must_use]
     pub fn at(&self, hertz: f64) -> Matrix6c {
         let above = self.bins.partition_point(|bin| bin.hertz <= hertz);
         match (above.checked_sub(1).and_then(|below| self.bins.get(below)), self.bins.get(above)) {

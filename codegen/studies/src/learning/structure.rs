@@ -104,7 +104,6 @@ impl Location {
 impl Structure {
     /// `[[mode]]` tables for a spec that has the modes `listed`, with the largest participation first. A spec refuses two modes of a kind
     /// at the same place and nearly the same frequency; the second one becomes a comment.
-    #[must_use]
     pub fn lines(&self, listed: &[language::StructuralMode]) -> String {
         let mut places: Vec<_> = listed.iter().map(|mode| (mode.kind, mode.place, mode.frequency)).collect();
         let mut modes = self.modes.clone();
@@ -166,7 +165,6 @@ impl StructuralMode {
 impl Learnable {
     /// The structural modes that bins of a measured response show beyond the model. None if the geometry does not determine the pose,
     /// or if fewer bins can be used than the platform has parameters.
-    #[must_use]
     pub fn structure(&self, compiled: &Compilation, bins: &[Bin]) -> Option<Structure> {
         let problem = Problem::new(self, compiled, bins)?;
         let mut fit = problem.fitted(&problem.start, Vec::new(), STEPS, Domain::Closed);

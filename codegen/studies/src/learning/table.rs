@@ -53,7 +53,6 @@ pub enum TableError {
 
 impl Table {
     /// A table for the digest of a spec, a machine and a named motion from this start pose; `spacing` and `before` in ticks.
-    #[must_use]
     pub fn new(
         [digest, machine, motion]: [&str; 3],
         [spacing, before]: [u32; 2],
@@ -65,7 +64,6 @@ impl Table {
     }
 
     /// The file content: JSON, one knot per line.
-    #[must_use]
     pub fn to_json(&self) -> String {
         let head = serde_json::json!({
             "format": self.format, "digest": self.digest, "machine": self.machine, "motion": self.motion,
@@ -128,7 +126,6 @@ pub(super) fn same(
 }
 
 /// Knots of the spline through every `spacing`-th value of a signal (m and rad) that starts and ends at 0.
-#[must_use]
 pub fn knots(signal: &[[f64; 6]], spacing: u32) -> Vec<Knot> {
     let values: Vec<[f64; 6]> = signal.iter().step_by(spacing as usize).copied().collect();
     let size = values.len();

@@ -36,7 +36,6 @@ pub struct Update {
 
 impl Update {
     /// For passes of a motion with errors averaged over `spacing` ticks, which attenuates high frequencies.
-    #[must_use]
     pub fn new(learnable: &Learnable, motion: &Motion, convergence: &Convergence, spacing: u32) -> Self {
         let width = f64::from(spacing) * learnable.closed_loop.period;
         let mut update = Self::of(learnable, motion, convergence.band[1], spacing, |frequencies| {
@@ -91,7 +90,6 @@ impl Update {
     /// ```
     /// G is the open-loop channel from the request to the pose, with the structural modes of the legs that are known, and Q that of f_c
     /// (Hz), without phase. d is what hysteretic `legs` do differently under r + c: c is found in rounds. Without `legs`, d = 0.
-    #[must_use]
     pub fn prepared(
         learnable: &Learnable,
         motion: &Motion,

@@ -15,7 +15,6 @@ pub const TABLE_2: [(&str, [f64; 3]); 3] =
     [("invhys", [127.039, 232.143, 504.539]), ("ewma", [103.086, 117.305, 191.409]), ("pcc", [80.5, 81.783, 156.25])];
 
 /// Slope of a row of [`TABLE_1`] relative to that at 0.1 Hz.
-#[must_use]
 pub fn slope_ratio(row: usize) -> f64 {
     TABLE_1.get(row).map_or(f64::NAN, |values| values[2] / TABLE_1[0][2])
 }

@@ -56,13 +56,11 @@ pub const TRIED: [(f64, Option<f64>); 10] = [
 ];
 
 /// The paper's limit of λ: (AII.18) as printed, (AII.19).
-#[must_use]
 pub fn printed(level: f64, drift: Option<f64>) -> f64 {
     drift.map_or(2.0, |drift| pcc_limit(level, drift))
 }
 
 /// The correct limit of λ for a leg without dynamics.
-#[must_use]
 pub fn jury(level: f64, drift: Option<f64>) -> f64 {
     drift.map_or_else(|| ewma_limit(level), |drift| pcc_limit(level, drift))
 }

@@ -34,13 +34,11 @@ specgen_language::named! {
 
 impl Remark {
     /// `reason`, unless the values agree.
-    #[must_use]
     pub fn of(paper: f64, ours: f64, reason: Self) -> Self {
         if (ours / paper - 1.0).abs() <= AGREES { Self::Agrees } else { reason }
     }
 
     /// The reason as text.
-    #[must_use]
     pub fn text(self) -> &'static str {
         match self {
             Self::Agrees => "Within 10 % of the paper.",

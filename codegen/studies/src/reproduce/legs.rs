@@ -13,7 +13,6 @@ use crate::paper::{printed, region};
 pub const SAMPLES: u32 = 500;
 
 /// Six equal reference legs, prepared, with noise from `seed`.
-#[must_use]
 pub fn scenario(seed: u64) -> LegScenario {
     let leg = LegParameters::reference();
     LegScenario::new(&std::array::from_fn(|_| leg.clone()), &leg.noise, seed, SAMPLES)

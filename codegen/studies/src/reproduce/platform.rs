@@ -2,10 +2,10 @@
 
 use host_sim::closed_loop::RunError;
 use host_sim::controller::TickController;
-use host_sim::platform::scenario::{FREE_MODES, MACHINING_MODES, select, select_at_equal_gains};
-use host_sim::platform::table::{MachiningTable, PoseRow, PoseTable, paper_machining, paper_rms};
+use host_sim::platform::scenario::{FREE_MODES, MACHINING_MODES};
+use host_sim::platform::table::{MachiningTable, PoseTable, paper_machining, paper_rms};
 use host_sim::platform::{PlatformScenario, WorkPart};
-use host_sim::trajectory::{PaperPath, PaperPose, Reading};
+use host_sim::trajectory::{PaperPath, PaperPose};
 
 use super::table::{Row, Table};
 use crate::paper::remark::Remark;
@@ -15,7 +15,6 @@ pub const FREQUENCIES: [f64; 3] = [0.1, 1.0, 10.0];
 /// The free motions.
 pub const CASES: [(&str, PaperPath); 2] = [("case-1", PaperPath::Case1), ("case-2", PaperPath::Case2)];
 /// Work parts.
-#[must_use]
 pub fn parts() -> [(&'static str, WorkPart); 2] {
     [("glass", WorkPart::glass()), ("aluminium", WorkPart::aluminium())]
 }
@@ -33,17 +32,12 @@ pub fn free_motion(
     frequency: f64,
     table: &mut PoseTable,
 ) -> Result<(), RunError> {
-    let trajectory = PaperPose { path, reading: Reading::Corrected, frequency };
-    for (mode, word) in FREE_MODES {
-        select_at_equal_gains(controller, word)?;
-        let run = scenario.run(controller, &trajectory)?;
-        table.rows.push(PoseRow::of(name, mode, frequency, run.scored()?));
-    }
+    let trajectory = PaperPose::corrected(path, frequency);
+    table.rows.extend(scenario.free_motion(controller, &FREE_MODES, (name, frequency), &trajectory)?.rows);
     Ok(())
 }
 
 /// Tables 5 and 6 (case 1) or 7 and 8 (case 2) from the runs.
-#[must_use]
 pub fn tables(runs: &PoseTable, case: &str) -> [Table; 2] {
     let first = case == "case-1";
     let ids = if first { ["table-5", "table-6"] } else { ["table-7", "table-8"] };
@@ -100,21 +94,15 @@ pub fn tables(runs: &PoseTable, case: &str) -> [Table; 2] {
 pub fn machining(
     scenario: &PlatformScenario,
     controller: &mut dyn TickController,
-    (name, part): (&str, WorkPart),
+    part: (&str, WorkPart),
     table: &mut MachiningTable,
 ) -> Result<(), RunError> {
-    let trajectory =
-        PaperPose { path: PaperPath::Machining, reading: Reading::Corrected, frequency: MACHINING_FREQUENCY };
-    for (mode, word) in MACHINING_MODES {
-        select(controller, word)?;
-        let run = scenario.against(controller, &trajectory, part)?;
-        table.push(name, mode, run.scored()?);
-    }
+    let trajectory = PaperPose::corrected(PaperPath::Machining, MACHINING_FREQUENCY);
+    table.rows.extend(scenario.machining(controller, &MACHINING_MODES, &[part], &trajectory)?.rows);
     Ok(())
 }
 
 /// Table 9 from the runs.
-#[must_use]
 pub fn table_9(runs: &MachiningTable) -> Table {
     let mut rows = Vec::new();
     for (part, _) in parts() {

@@ -41,7 +41,6 @@ pub struct Row {
 
 impl Row {
     /// Two numbers, and the reason for a difference.
-    #[must_use]
     pub fn numbers(
         [case, quantity]: [&str; 2],
         frequency_hz: Option<f64>,
@@ -86,7 +85,6 @@ pub struct Table {
 
 impl Table {
     /// Remarks used by its rows, without duplicates.
-    #[must_use]
     pub fn remarks(&self) -> Vec<Remark> {
         let mut remarks: Vec<Remark> = self.rows.iter().filter_map(|row| row.remark).collect();
         remarks.sort_unstable();

@@ -54,7 +54,6 @@ pub struct Deviation {
 
 impl Deviation {
     /// Six equal legs, with the value of each factor from `of`.
-    #[must_use]
     pub fn common(of: impl Fn(Factor) -> f64) -> Self {
         let leg = LegDeviation {
             stiffness: of(Factor::Stiffness),
@@ -77,7 +76,6 @@ impl Deviation {
     }
 
     /// Uniformly distributed within the ranges, from `seed` only; every leg separately.
-    #[must_use]
     pub fn drawn(factors: &Factors, seed: u64) -> Self {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         rng.set_stream(STREAM);
@@ -114,7 +112,6 @@ impl Deviation {
     }
 
     /// Six legs with their own gauges. Mass and stiffness act through the resonance.
-    #[must_use]
     pub fn legs_of(&self, leg: &LegParameters) -> [LegParameters; LEGS] {
         self.legs.map(|deviation| {
             let mut own = self.leg_of(leg, &deviation);
@@ -125,7 +122,6 @@ impl Deviation {
     }
 
     /// The platform of a spec with this deviation; `leg` gives the shape of the hysteresis.
-    #[must_use]
     pub fn specimen(&self, model: &Model, task: &TaskSpace, leg: &LegParameters) -> Specimen {
         let mut specimen = machine::specimen(model, task, leg, None);
         let structure = self.structure.map(|shares| (shares, StructureRange::of(model, &specimen)));

@@ -22,7 +22,6 @@ pub struct Gate {
 
 impl Gate {
     /// Why the runs fail, one reason per line; empty if they pass.
-    #[must_use]
     pub fn reasons(&self, runs: &[(Member, Outcome)]) -> Vec<String> {
         let mut reasons = Vec::new();
         let lost: Vec<&str> = runs

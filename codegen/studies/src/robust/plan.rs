@@ -35,7 +35,6 @@ pub struct Plan {
 
 impl Plan {
     /// The nominal machine, corners with the noise of `seed`, and `samples` random machines with seeds from `seed`.
-    #[must_use]
     pub fn new(factors: &Factors, samples: u32, seed: u64) -> Self {
         let mut members = corners(factors, seed);
         let mut rng = ChaCha8Rng::seed_from_u64(seed);

@@ -2,7 +2,6 @@
 
 /// The smallest figure that at least `percent` (0 to 100) of all runs do not exceed: nearest rank, so it is the figure
 /// of an actual run. A diverged run counts as larger than all others. `None` if the quantile is that of a diverged run, or there are no runs.
-#[must_use]
 pub fn quantile(figures: &[Option<f64>], percent: f64) -> Option<f64> {
     let mut sorted: Vec<f64> = figures.iter().map(|figure| figure.unwrap_or(f64::INFINITY)).collect();
     sorted.sort_by(f64::total_cmp);

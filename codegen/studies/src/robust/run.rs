@@ -77,7 +77,6 @@ pub enum Outcome {
 
 impl Outcome {
     /// The figures of a run that stayed within the bound.
-    #[must_use]
     pub fn figures(&self) -> Option<&Figures> {
         match self {
             Self::Ran(figures) => Some(figures),

@@ -34,7 +34,6 @@ impl Shard {
     }
 
     /// Its members of a plan, in order.
-    #[must_use]
     pub fn of(self, plan: &Plan) -> Plan {
         let from = self.index.saturating_sub(1) as usize;
         Plan { members: plan.members.iter().skip(from).step_by(self.of.max(1) as usize).cloned().collect() }

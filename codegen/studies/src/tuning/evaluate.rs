@@ -68,7 +68,6 @@ pub enum TrajectoryChoice {
 
 impl TrajectoryChoice {
     /// The trajectory for the platform of a spec.
-    #[must_use]
     pub fn of_platform(self, model: &Model, task: &TaskSpace) -> Box<dyn PoseTrajectory> {
         match self {
             Self::Step(step) => Box::new(step),
@@ -132,7 +131,6 @@ pub enum Evaluation {
 
 impl Evaluation {
     /// The score of a completed run.
-    #[must_use]
     pub fn score(&self) -> Option<&Score> {
         match self {
             Self::Scored(score) => Some(score),
@@ -248,7 +246,6 @@ impl Case {
     }
 
     /// A controller for [`Case::run`], one per thread.
-    #[must_use]
     pub fn worker(&self) -> Controller {
         match &self.kind {
             Kind::Platform { study, .. } => study.controller(),
@@ -257,7 +254,6 @@ impl Case {
     }
 
     /// Simulated time of one run, s.
-    #[must_use]
     pub fn seconds(&self) -> f64 {
         match &self.kind {
             Kind::Platform { study, .. } => study.seconds(),

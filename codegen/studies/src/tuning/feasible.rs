@@ -55,7 +55,6 @@ pub enum Feasibility {
 
 impl Feasibility {
     /// For a compiled spec.
-    #[must_use]
     pub fn of(compiled: &Compilation, required: RequiredMargins) -> Self {
         let model = &compiled.model;
         let legs = || Self::Legs { dynamics: LegDynamics::of(model), adaptation: model.adaptation.clone(), required };
@@ -78,7 +77,6 @@ impl Feasibility {
     }
 
     /// Whether `setting` is stable with the margins.
-    #[must_use]
     pub fn holds(&self, setting: &Setting) -> bool {
         match (self, setting) {
             (Self::Legs { dynamics, adaptation, required }, Setting::Legs { level, drift }) => {
@@ -95,7 +93,6 @@ impl Feasibility {
     }
 
     /// The tuned parameters of a setting, within their bounds and reduced until they meet the margins; `None` if no reduction does.
-    #[must_use]
     pub fn reduce(&self, space: &Space, setting: Setting) -> Option<Setting> {
         let bounded = |setting| space.setting(&space.genes(&setting));
         let settings = std::iter::successors(Some(bounded(setting)), |last| Some(bounded(last.scaled(SHRINK))));

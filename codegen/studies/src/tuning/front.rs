@@ -1,13 +1,10 @@
 //! Pareto front of error and effort.
 
-use std::fmt::Write as _;
-
 use super::Candidate;
 use super::search::Generation;
 use super::space::Space;
 
 /// The Pareto front in ascending order of error, from candidates in any order.
-#[must_use]
 pub fn front(candidates: &[Candidate]) -> Vec<Candidate> {
     let mut sorted = candidates.to_vec();
     sorted.sort_by(|a, b| {
@@ -26,7 +23,6 @@ pub fn front(candidates: &[Candidate]) -> Vec<Candidate> {
 }
 
 /// The front as CSV: figures, then the tuned parameters.
-#[must_use]
 pub fn to_csv(front: &[Candidate], space: &Space) -> String {
     let mut out = String::from(
         "candidate,error_nm,effort_nm,peak_nm,translation_nm,orientation_nrad,cost_um_s2,seconds,path_seconds",
@@ -36,10 +32,9 @@ pub fn to_csv(front: &[Candidate], space: &Space) -> String {
     for Candidate { number, setting, score } in front {
         let figures =
             [score.error_nm, score.effort_nm, score.peak_nm, score.translation_nm, score.orientation_nrad, score.cost];
-        // Writing to a String cannot fail, here and above.
-        let _ = write!(out, "{number}");
+        out += &format!("{number}");
         out.extend(figures.iter().map(|figure| format!(",{figure:.6e}")));
-        let _ = write!(out, ",{:.6},{:.6}", score.coverage.seconds, score.coverage.path_seconds);
+        out += &format!(",{:.6},{:.6}", score.coverage.seconds, score.coverage.path_seconds);
         out.extend(space.parameters.iter().map(|parameter| format!(",{:.3e}", space.value(setting, parameter.role))));
         out.push('\n');
     }
@@ -47,13 +42,12 @@ pub fn to_csv(front: &[Candidate], space: &Space) -> String {
 }
 
 /// Costs by generation as CSV.
-#[must_use]
 pub fn history_csv(history: &[Generation]) -> String {
     let mut out = String::from("evaluations,best_cost_um_s2,median_cost_um_s2,unstable,limited\n");
     let number = |value: Option<f64>| value.map_or_else(String::new, |value| format!("{value:.9e}"));
     for one in history {
         let (best, median) = (number(one.best), number(one.median));
-        let _ = writeln!(out, "{},{best},{median},{},{}", one.evaluations, one.unstable, one.limited);
+        out += &format!("{},{best},{median},{},{}\n", one.evaluations, one.unstable, one.limited);
     }
     out
 }

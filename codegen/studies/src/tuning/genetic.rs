@@ -45,7 +45,6 @@ fn below(rng: &mut ChaCha8Rng, count: usize) -> usize {
 
 impl Genetic {
     /// Random strings, including those of `starts` (numbers in [0, 1]).
-    #[must_use]
     pub fn new(settings: Settings, dimension: usize, starts: &[Vec<f64>], seed: u64) -> Self {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         rng.set_stream(STREAM);

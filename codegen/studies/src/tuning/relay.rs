@@ -51,7 +51,6 @@ pub struct Ultimate {
 impl Ultimate {
     /// k_p and k_I by Ziegler and Nichols for PI, divided by the stiffness of the axis: 0.45 K_u and k_p/(T_u/1.2), the latter
     /// in 1/s.
-    #[must_use]
     pub fn ziegler_nichols(&self) -> [f64; 2] {
         let proportional = 0.45 * self.gain;
         [proportional, proportional / (self.period / 1.2)]

@@ -113,7 +113,6 @@ pub struct Search {
 
 impl Search {
     /// The candidate with the lowest cost; the first if there are several.
-    #[must_use]
     pub fn best(&self) -> Option<&Candidate> {
         let mut best: Option<&Candidate> = None;
         for candidate in &self.scored {

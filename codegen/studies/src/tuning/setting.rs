@@ -34,7 +34,6 @@ pub enum Setting {
 
 impl Setting {
     /// The values from the spec or chosen by the compiler.
-    #[must_use]
     pub fn of(compiled: &Compilation) -> Self {
         let model = &compiled.model;
         match &compiled.design {
@@ -51,7 +50,6 @@ impl Setting {
     /// The configuration words of `controller` with these parameters, otherwise the spec's.
     ///
     /// Every emitted controller of its kind has all these names; a missing word would be left unchanged.
-    #[must_use]
     pub fn words(&self, controller: &Controller) -> Vec<u64> {
         let mut words = controller.default_config();
         let description = controller.description();
@@ -93,7 +91,6 @@ impl Setting {
     }
 
     /// The gains in use: those of P if `alone`, else of the other modes. Legs have none.
-    #[must_use]
     pub fn tuning(&self, alone: bool) -> Tuning {
         match self {
             Self::Legs { .. } => Tuning::NONE,

@@ -185,13 +185,11 @@ impl Space {
     }
 
     /// Number of parameters.
-    #[must_use]
     pub fn dimension(&self) -> usize {
         self.parameters.len()
     }
 
     /// The setting for numbers in [0, 1]; others are clipped.
-    #[must_use]
     pub fn setting(&self, genes: &[f64]) -> Setting {
         let mut setting = self.base;
         for (parameter, gene) in self.parameters.iter().zip(genes) {
@@ -232,7 +230,6 @@ impl Space {
     }
 
     /// The numbers in [0, 1] for a setting, or for the nearest one within bounds.
-    #[must_use]
     pub fn genes(&self, setting: &Setting) -> Vec<f64> {
         self.parameters
             .iter()
@@ -252,7 +249,6 @@ impl Space {
     }
 
     /// The stiffness that gains are relative to.
-    #[must_use]
     pub fn stiffness(&self) -> &[f64; 6] {
         &self.stiffness
     }
@@ -278,7 +274,6 @@ impl Space {
     }
 
     /// A parameter of `setting`: gains relative to the stiffness of their axis.
-    #[must_use]
     pub fn value(&self, setting: &Setting, role: Role) -> f64 {
         match setting {
             Setting::Legs { level, drift } => match role {
@@ -301,7 +296,6 @@ impl Space {
 }
 
 /// K_ii = (Jᵀ k_a J)_ii at rest for a compiled model, N/m and N m/rad.
-#[must_use]
 pub fn axis_stiffness(model: &Model) -> [f64; 6] {
     // Compilation succeeded, so the fallback is never used.
     let Ok(platform) = platform(model) else { return [1.0; 6] };
@@ -312,7 +306,6 @@ pub fn axis_stiffness(model: &Model) -> [f64; 6] {
 }
 
 /// Rounds to four significant digits through the decimal text that the spec will contain: the double nearest to that text.
-#[must_use]
 pub fn rounded(value: f64) -> f64 {
     format!("{value:.3e}").parse().unwrap_or(value)
 }

@@ -120,7 +120,6 @@ fn set(table: &mut Table, key: &str, mut value: Value) {
 }
 
 /// The change as a patch for `patch -p0` and `git apply -p0`.
-#[must_use]
 pub fn patch(name: &str, old: &str, new: &str) -> String {
     let mut options = DiffOptions::new();
     options.set_original_filename(name.to_owned()).set_modified_filename(name.to_owned());

@@ -78,21 +78,18 @@ pub struct Figure {
 
 impl Figure {
     /// A figure without limit.
-    #[must_use]
     pub fn new(subject: Subject, name: &str, value: f64, unit: &'static str) -> Self {
         let name = name.to_owned();
         Self { subject, name, value, more: false, unit, limit: None, mark: Mark::NoLimit, words: None, coverage: None }
     }
 
     /// A fact as text, good or bad.
-    #[must_use]
     pub fn fact(subject: Subject, name: &str, words: String, good: bool) -> Self {
         let mark = if good { Mark::Within } else { Mark::Beyond };
         Self { mark, words: Some(words), ..Self::new(subject, name, 0.0, "") }
     }
 
     /// A figure known only to be larger than `value`.
-    #[must_use]
     pub fn more_than(subject: Subject, name: &str, value: f64, unit: &'static str) -> Self {
         Self { more: true, ..Self::new(subject, name, value, unit) }
     }
@@ -118,13 +115,11 @@ impl Figure {
     }
 
     /// The value without its unit, in KiB for bytes; `> 5` if it is larger.
-    #[must_use]
     pub fn value_text(&self) -> String {
         if self.more { format!("> {}", plain(self.value, self.unit)) } else { number(self.value, self.unit) }
     }
 
     /// Relation of value and limit: `≤`, `>`, `≥` or `<`; `None` without a limit.
-    #[must_use]
     pub fn relation(&self) -> Option<&'static str> {
         let limit = self.limit.as_ref()?;
         Some(match (limit.least, self.mark) {
@@ -136,7 +131,6 @@ impl Figure {
     }
 
     /// The limit without its unit, formatted as the value; empty if there is none.
-    #[must_use]
     pub fn limit_text(&self) -> String {
         self.limit.as_ref().map_or_else(String::new, |limit| plain(limit.value, self.unit))
     }

@@ -139,43 +139,19 @@ impl<'a> Keeper<'a> {
 mod tests {
     use super::*;
     use crate::record::Writer;
-    use controller::PLACE_WORDS;
-    use controller::snapshot::recorder;
     use controller::supervised::machine_at_reset;
     use controller::supervised::{MACHINE_INPUT_WORDS, MachineInput};
     use rtrb::RingBuffer;
-    use specgen_link::EdgeStatus;
 
     fn row(count: u64, digest: u64) -> Row {
-        let output = recorder::Row { codes: [0; 6], status: 0, supervisor: 0 };
-        let place = [0; PLACE_WORDS];
         let input = MachineInput::from_words(&[count; MACHINE_INPUT_WORDS]);
-        let (opens, waving, triggered) = (false, false, false);
-        Row {
-            tick: count,
-            count,
-            input,
-            output,
-            place,
-            digest,
-            late: 0,
-            commands: 0,
-            opens,
-            waving,
-            edge: EdgeStatus::NONE,
-            recorded: None,
-            triggered,
-        }
+        Row { digest, input, ..crate::bench::row(count) }
     }
 
     #[test]
     fn rows_that_find_no_room_are_counted_and_the_record_goes_on_behind_them_with_a_state() {
         let (machine, config, shared) = (machine_at_reset(), Config::new(), Shared::default());
-        let (rows, mut taken) = RingBuffer::new(4);
-        let (snapshots, mut states) = RingBuffer::new(2);
-        let (tapes, _tapes) = RingBuffer::new(1);
-        let outlets = Outlets { rows, snapshots: Some(snapshots), tapes };
-        let mut keeper = Keeper::new(outlets, None, &shared, (&machine, &config));
+        let (mut keeper, (mut taken, mut states, _tapes)) = keeper([4, 2], true, &shared);
         let path = std::env::temp_dir().join(format!("rt-pc-gap-{}.rec", std::process::id()));
         let mut writer = Writer::create(&path, &config).unwrap();
         for count in 0..14 {
@@ -195,23 +171,17 @@ mod tests {
         assert_eq!(writer.finish().unwrap(), 7);
         let bytes = std::fs::read(&path).unwrap();
         std::fs::remove_file(&path).unwrap();
-        let word = |at: usize| u64::from_le_bytes(bytes[at..at + 8].try_into().unwrap());
-        let mut at = 16 + word(8).checked_shr(32).unwrap() as usize + 8;
-        let mut blocks = Vec::new();
-        while at < bytes.len() {
-            // Rows, first tick, why it begins.
-            blocks.push([word(at + 16), word(at + 24), word(at + 32) & 0xffff_ffff]);
-            at += (word(at + 8) as usize + 1) * 8;
-        }
-        assert_eq!(blocks, [[4, 0, 0], [3, 11, 0]]);
+        // Rows, first tick, why it begins.
+        let blocks = crate::bench::blocks(&bytes).into_iter().map(|block| [block[2], block[3], block[4] & 0xffff_ffff]);
+        assert_eq!(blocks.collect::<Vec<_>>(), [[4, 0, 0], [3, 11, 0]]);
     }
 
     type Ends = (rtrb::Consumer<Row>, rtrb::Consumer<Snapshot>, rtrb::Consumer<(Tape, u32)>);
 
     /// A keeper with rings of this room, and their other ends.
-    fn keeper(room: usize, records: bool, shared: &Shared) -> (Keeper<'_>, Ends) {
+    fn keeper([room, states]: [usize; 2], records: bool, shared: &Shared) -> (Keeper<'_>, Ends) {
         let (rows, rows_out) = RingBuffer::new(room);
-        let (snapshots, snapshots_out) = RingBuffer::new(room);
+        let (snapshots, snapshots_out) = RingBuffer::new(states);
         let (tapes, tapes_out) = RingBuffer::new(1);
         let outlets = Outlets { rows, snapshots: records.then_some(snapshots), tapes };
         let keeper = Keeper::new(outlets, None, shared, (&machine_at_reset(), &Config::new()));
@@ -221,7 +191,7 @@ mod tests {
     #[test]
     fn a_block_begins_with_a_state_after_so_many_rows_and_with_other_settings() {
         let (machine, config, shared) = (machine_at_reset(), Config::new(), Shared::default());
-        let (mut keeper, (mut rows, mut snapshots, _)) = keeper(8, true, &shared);
+        let (mut keeper, (mut rows, mut snapshots, _)) = keeper([8; 2], true, &shared);
         assert!(keeper.wants_digest());
         let mut opened = Vec::new();
         let last = 2 * u64::from(SNAPSHOT_EVERY) + 50;
@@ -246,7 +216,7 @@ mod tests {
     #[test]
     fn a_run_that_is_not_recorded_hands_rows_alone() {
         let (machine, config, shared) = (machine_at_reset(), Config::new(), Shared::default());
-        let (mut keeper, (mut rows, mut snapshots, mut tapes)) = keeper(4, false, &shared);
+        let (mut keeper, (mut rows, mut snapshots, mut tapes)) = keeper([4; 2], false, &shared);
         assert!(!keeper.wants_digest());
         keeper.trigger();
         keeper.stop();
@@ -272,7 +242,7 @@ mod tests {
     #[test]
     fn a_recorder_that_finds_no_room_is_kept_and_given_back_at_the_end() {
         let (machine, config, shared) = (machine_at_reset(), Config::new(), Shared::default());
-        let (mut keeper, (_rows, _snapshots, mut tapes)) = keeper(4, true, &shared);
+        let (mut keeper, (_rows, _snapshots, mut tapes)) = keeper([4; 2], true, &shared);
         for expected in [false, true] {
             let (_, tape) = crate::capture::Capture::new(None).unwrap();
             keeper.take(tape, 0);

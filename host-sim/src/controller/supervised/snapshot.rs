@@ -25,13 +25,11 @@ pub enum SnapshotError {
 
 impl Supervised {
     /// Words of [`Supervised::save`].
-    #[must_use]
     pub fn state_words(&self) -> usize {
         self.controller.engine.machine_words()
     }
 
     /// The machine as words.
-    #[must_use]
     pub fn save(&self) -> Vec<u64> {
         let mut words = vec![0; self.state_words()];
         self.controller.engine.save_machine(&mut words);

@@ -37,7 +37,6 @@ pub enum Command {
 
 impl Command {
     /// Its word.
-    #[must_use]
     pub fn word(self) -> u64 {
         self as u64
     }
@@ -60,7 +59,6 @@ pub struct Request {
 
 impl Request {
     /// The next set-point of a stream.
-    #[must_use]
     pub fn stream(target: PoseTarget) -> Self {
         Self { command: Command::Stream, selector: 0, fresh: true, target, ..Self::default() }
     }
@@ -162,7 +160,6 @@ impl<'a> Bench<'a> {
     }
 
     /// The words kept.
-    #[must_use]
     pub fn into_trace(self) -> Option<Trace> {
         self.trace
     }
@@ -173,7 +170,6 @@ impl<'a> Bench<'a> {
     }
 
     /// The output words of the last tick.
-    #[must_use]
     pub fn output(&self) -> &[u64] {
         &self.output
     }

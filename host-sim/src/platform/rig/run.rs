@@ -53,7 +53,6 @@ pub struct RunOptions {
 
 impl RunOptions {
     /// Free motion at a control interval (s) with a bias pose.
-    #[must_use]
     pub fn new(interval: f64, bias: Six) -> Self {
         Self {
             interval,
@@ -234,7 +233,6 @@ impl PlatformRig {
 
 impl PlatformRun {
     /// Whether the controller followed every set-point: none was refused or stale.
-    #[must_use]
     pub fn is_followed(&self) -> bool {
         self.status & NOT_FOLLOWED == 0
     }
@@ -252,7 +250,6 @@ impl PlatformRun {
 
     /// CSV, one line per stored tick: target, pose and error, the controller's measurement, outputs and status. SI
     /// units.
-    #[must_use]
     pub fn to_csv(&self) -> String {
         let six = |stem: &str| (0..6).map(|k| format!(",{stem}[{k}]")).collect::<String>();
         let mut out = String::from("time_s");

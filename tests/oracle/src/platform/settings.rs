@@ -25,7 +25,6 @@ pub struct Drive {
 
 impl Drive {
     /// 16 bits over 150 V, limited to 100 V and 40 V/ms; 0.631 µm/V.
-    #[must_use]
     pub fn reference(period: f64) -> Self {
         let lsb = 150.0 / 65535.0;
         Self {
@@ -70,7 +69,6 @@ pub struct Settings {
 impl Settings {
     /// Settings for a machine, from its nominal data and reversal curves of every leg (32 intervals, 20 V/s), at a control period
     /// (s): gains by the study's rule, bias 10 µm up in 0.3 s.
-    #[must_use]
     pub fn of(specimen: &Specimen, period: f64, notch_damping: Option<f64>) -> Self {
         let rule = Rule::of(&specimen.nominal, LegParameters::reference().tau_amp_s, period, notch_damping);
         let design = rule.design();
@@ -91,7 +89,6 @@ impl Settings {
     }
 
     /// Base N of the study for a machine, at 10 kHz: notch of ζ_d = 1 and gains by hand; P alone as tuned there.
-    #[must_use]
     pub fn base_n(specimen: &Specimen) -> Self {
         Self {
             combined: Gains { proportional: 0.05, integral: 150.0, level: 450.0, drift: 19.6 },

@@ -6,7 +6,7 @@ use host_sim::plant::LegParameters;
 use host_sim::platform::PlatformParameters;
 use host_sim::platform::rig::{GaugeFault, Record};
 use host_sim::platform::rig::{Noise, RunOptions};
-use host_sim::platform::scenario::{FREE_MODES, MACHINING_MODES, NamedTrajectory, select};
+use host_sim::platform::scenario::{FREE_MODES, MACHINING_MODES, select};
 use host_sim::platform::{PlatformScenario, Specimen, WorkPart};
 use host_sim::trajectory::{PaperPath, PaperPose, PoseTarget, PoseTrajectory};
 use oracle::design::{Deviation, Gains, Rule};
@@ -32,8 +32,7 @@ fn case_1_at_10_hz_and_machining_have_the_figures_of_the_study() {
     let scenario = scenario(&specimen, &settings, &Noise::of(&specimen));
     let mut controller = PlatformOracle::new(&settings).unwrap();
     let case = PaperPose::corrected(PaperPath::Case1, 10.0);
-    let named = [NamedTrajectory { name: "case-1", frequency: 10.0, trajectory: &case }];
-    let table = scenario.free_motion(&mut controller, &FREE_MODES, &named).unwrap();
+    let table = scenario.free_motion(&mut controller, &FREE_MODES, ("case-1", 10.0), &case).unwrap();
     println!("{}", table.to_text(true));
     let row = |mode| table.row("case-1", mode, 10.0).unwrap();
     // Study, base N: Invhys 67/71/21, EWMA 14.2/22.0/4.7, PCC 14.0/22.0/4.7 nm, on legs with other tolerances.

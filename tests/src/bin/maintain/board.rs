@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
 
 use serde_json::Value;
-use specgen_language::model::{BOARDS, Trigger, TriggerKind};
+use specgen_language::model::{BOARDS, Model, Trigger, TriggerKind};
 use specgen_language::{SpecSource, spec};
 use specgen_toolchain::provision;
 
@@ -292,12 +292,15 @@ fn corrected(table: &str) -> usize {
         .count()
 }
 
+/// The model of a spec.
+fn model(path: &Path) -> Result<Model, String> {
+    let source = SpecSource::read(path).map_err(|finding| finding.message)?;
+    spec::load(&source).0.ok_or_else(|| format!("{} is refused", path.display()))
+}
+
 /// Whether a spec has such a trigger.
 fn has_triggers(path: &Path, such: impl Fn(&Trigger) -> bool) -> Result<bool, String> {
-    let source = SpecSource::read(path).map_err(|finding| finding.message)?;
-    let (model, _) = spec::load(&source);
-    let model = model.ok_or_else(|| format!("{} is refused", path.display()))?;
-    Ok(model.task_space.is_some_and(|task| task.triggers.iter().any(such)))
+    Ok(model(path)?.task_space.is_some_and(|task| task.triggers.iter().any(such)))
 }
 
 /// A motion to learn.
@@ -311,9 +314,7 @@ struct LearnedMotion {
 
 /// The first trajectory that a machine of this spec can learn, if its controller has a correction.
 fn learnable(path: &Path) -> Result<Option<LearnedMotion>, String> {
-    let source = SpecSource::read(path).map_err(|finding| finding.message)?;
-    let (model, _) = spec::load(&source);
-    let model = model.ok_or_else(|| format!("{} is refused", path.display()))?;
+    let model = model(path)?;
     let task = model.task_space.filter(|task| task.correction.is_some());
     let record = (RECORD / model.timing.period) as u32;
     let noise = model.sensor.noise * 1e9;
@@ -353,14 +354,12 @@ fn learn(trial: &Trial, session: &mut Session, motion: &LearnedMotion) -> Result
     let mut host = Host::of(session.command_of(trial, "operate"))?;
     let play =
         format!("record arm {record}\nrecord trigger\nplay {motion} correction=learned.json machine=emulated\nstatus");
-    for (orders, words) in [
+    host.orders(&[
         ("arm\nwait holding 600\nrun\nwait running 600\nset command=0\nwait arrived 600\nstatus", ": running"),
         (&play, STATUS),
         ("record stop\nrecord download pass.rec", "wrote "),
         ("ramp-down\nwait disarmed 600\nstatus", "disarmed, amplifiers off"),
-    ] {
-        host.order(orders, words)?;
-    }
+    ])?;
     Ok(())
 }
 
@@ -368,21 +367,17 @@ fn learn(trial: &Trial, session: &mut Session, motion: &LearnedMotion) -> Result
 fn wait_for_edge(trial: &Trial, session: &mut Session) -> Result<(), String> {
     let mut host = Host::of(session.command_of(trial, "operate"))?;
     session.command("input low")?;
-    for (orders, words) in [
+    host.orders(&[
         ("arm\nwait holding 600\nrun\nwait running 600\nwait arrived 600\nset command=hold\nstatus", ": running"),
         ("record arm 400\nrecord trigger\non-edge move z=0.2um\non-edge", "waits for the edge"),
-    ] {
-        host.order(orders, words)?;
-    }
+    ])?;
     session.command("input high")?;
     session.pass(10.0)?;
-    for (orders, words) in [
+    host.orders(&[
         ("on-edge", "begun at the edge of tick "),
         ("record stop\nrecord download edge.rec", "wrote "),
         ("ramp-down\nwait disarmed 600\nstatus", "disarmed, amplifiers off"),
-    ] {
-        host.order(orders, words)?;
-    }
+    ])?;
     Ok(())
 }
 

@@ -53,7 +53,6 @@ pub struct StructuralChannel {
 
 impl StructuralChannel {
     /// Whether it acts on what the gauges see, and not on the legs.
-    #[must_use]
     pub fn on_readings(&self) -> bool {
         matches!(self.flexure, Flexure::Sensor(_))
     }

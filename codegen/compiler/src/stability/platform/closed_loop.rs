@@ -73,14 +73,12 @@ pub struct ClosedLoop {
 
 impl ClosedLoop {
     /// Largest magnitude of an eigenvalue of one tick; infinite if it cannot be found.
-    #[must_use]
     pub fn spectral_radius(&self, law: ControlMode, tuning: &Tuning, conditions: &Conditions) -> f64 {
         spectral_radius(&self.transition(law, tuning, conditions))
     }
 
     /// The matrix of one tick. States that the law or the tuning does not use are left out: an idle integrator would give an
     /// eigenvalue of 1.
-    #[must_use]
     pub fn transition(&self, law: ControlMode, tuning: &Tuning, conditions: &Conditions) -> Matrix {
         Assembly::new(self, law, tuning, conditions).matrix()
     }

@@ -5,7 +5,6 @@ use specgen_language::model::{self, AdaptationMode, Model, TaskSpace};
 use specgen_runtime::{ControlMode, Law};
 
 /// The mode that a spec starts with.
-#[must_use]
 pub fn start_mode(model: &Model, task: &TaskSpace) -> ControlMode {
     match task.mode {
         model::ControlMode::P => ControlMode::P,
@@ -15,7 +14,6 @@ pub fn start_mode(model: &Model, task: &TaskSpace) -> ControlMode {
 }
 
 /// The run-to-run law that a spec starts with.
-#[must_use]
 pub fn start_law(model: &Model) -> Law {
     match model.adaptation.mode {
         AdaptationMode::Invhys => Law::Invhys,
@@ -39,7 +37,6 @@ pub enum LoopKind {
 
 impl LoopKind {
     /// That of a mode.
-    #[must_use]
     pub fn of(mode: ControlMode) -> Self {
         match (mode.feeds_back(), mode.uses_position_gains()) {
             (true, true) => Self::Position,
@@ -50,7 +47,6 @@ impl LoopKind {
     }
 
     /// The modes that close it.
-    #[must_use]
     pub fn modes(self) -> Vec<ControlMode> {
         ControlMode::all().filter(|mode| Self::of(*mode) == self).collect()
     }

@@ -107,7 +107,6 @@ impl ClosedLoop {
     }
 
     /// Eigenvalues of the open loop, as (real, imaginary), at the angles ωT. Contact and λ are left out.
-    #[must_use]
     pub fn loci(
         &self,
         law: ControlMode,

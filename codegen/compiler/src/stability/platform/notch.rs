@@ -24,7 +24,6 @@ impl Biquad {
     pub const IDENTITY: Self = Self { b: [1.0, 0.0, 0.0], a: [0.0, 0.0] };
 
     /// (s² + 2 ζ ω s + ω²) / (s² + 2 ζ_d ω s + ω²), bilinear with the mode itself prewarped; `frequency` in rad/s below π/T.
-    #[must_use]
     pub fn notch(frequency: f64, damping_ratio: f64, notch_damping: f64, period: f64) -> Self {
         let t = libm::tan(0.5 * frequency * period);
         let square = t * t;

@@ -11,7 +11,6 @@ use specgen_runtime::ControlMode;
 impl ClosedLoop {
     /// The open loop of each axis x to θz at `frequencies` (Hz, below half the tick rate), with the other axes open as well: gain
     /// (a ratio) and phase (degrees, unwrapped from that of the lowest frequency). With λ = 1, free of contact.
-    #[must_use]
     pub fn open_loop(&self, law: ControlMode, tuning: &Tuning, frequencies: &[f64]) -> [Vec<[f64; 2]>; 6] {
         let angles: Vec<f64> = frequencies.iter().map(|hertz| TAU * hertz * self.period).collect();
         let responses = self.modal_responses(&Conditions::NOMINAL, 1.0, &angles);

@@ -11,7 +11,6 @@ use super::law::{LoopKind, Tuning};
 const MULTIPLES: [f64; 5] = [1.0, 1.5, 2.0, 3.0, 4.0];
 
 /// A few lines: modes, gains, and a table of margins.
-#[must_use]
 pub fn describe(design: &Design) -> String {
     let mut text = String::new();
     // Writing to a String cannot fail.
@@ -90,7 +89,6 @@ fn gains(name: &str, tuning: &Tuning) -> String {
 }
 
 /// Effect of active damping, mode by mode.
-#[must_use]
 pub fn describe_damping(design: &Design, damping: &ActiveDamping) -> String {
     let lowest = design.modes[0].frequency / TAU;
     let (first, second, third) = (lowest / SLOW[0], lowest / SLOW[1], lowest / SLOW[2]);

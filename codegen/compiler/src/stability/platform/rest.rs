@@ -11,7 +11,6 @@ impl ClosedLoop {
     /// maps independent noise of unit variance (columns) to noise of the readings in pose coordinates; `amplifiers` maps it to noise of
     /// the pose that the legs request. Both are white from tick to tick, and a voltage is held over a tick. Hysteresis and the steps of
     /// the converters are not included.
-    #[must_use]
     pub fn at_rest(&self, law: ControlMode, tuning: &Tuning, gauges: &Matrix6, amplifiers: &Matrix6) -> [[f64; 6]; 2] {
         let modal = |factor: &Matrix6| multiply6(&self.basis.to_modal, factor);
         let (transition, request) = self.driven(law, tuning, &Conditions::NOMINAL, false);

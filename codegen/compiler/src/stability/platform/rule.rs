@@ -38,7 +38,6 @@ const ROBUST: [Conditions; 4] = [
 
 /// Ω, rad/s: lowest level bandwidth at which EWMA alone is unstable on the nominal platform; 1/T_s, a weight of 1, if none
 /// is unstable; zero if even a ten-thousandth of that is.
-#[must_use]
 pub fn bandwidth_limit(closed_loop: &ClosedLoop) -> f64 {
     let fastest = 1.0 / closed_loop.period;
     largest_stable(1e-4 * fastest, fastest, 1.15, |bandwidth| {

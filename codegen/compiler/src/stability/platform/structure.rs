@@ -66,7 +66,6 @@ impl StructureDemand {
     }
 
     /// That of a spec.
-    #[must_use]
     pub fn of(model: &Model, basis: &ModalBasis) -> Self {
         let declared = &model.structure;
         let flexure = |kind: &StructuralKind| match kind {
@@ -102,7 +101,6 @@ pub struct Border {
 impl Border {
     /// Of the intervals from the one about `from` (Hz) on, the one that demands the most damping: its lowest frequency, Hz, and that ζ.
     /// None if every damping is enough. The lowest frequency of the declared range begins an interval.
-    #[must_use]
     pub fn worst(&self, from: f64) -> Option<[f64; 2]> {
         let both = self.frequencies.iter().zip(&self.damping_ratios).skip(self.interval(from).unwrap_or(0));
         both.filter(|(_, ratio)| **ratio > 0.0)
@@ -152,7 +150,6 @@ pub struct Corners {
 
 impl Corners {
     /// Those of a loop, with what it must tolerate.
-    #[must_use]
     pub fn of(of: ClosedLoop, demand: StructureDemand) -> Self {
         let angles = angles(&of);
         let plants = std::iter::once((Conditions::NOMINAL, 1.0)).chain(corners()).map(|(conditions, lag)| {
@@ -164,7 +161,6 @@ impl Corners {
     }
 
     /// The loop.
-    #[must_use]
     pub fn closed_loop(&self) -> &ClosedLoop {
         &self.of
     }
@@ -202,7 +198,6 @@ impl Corners {
     }
 
     /// Whether a control mode is stable with every structural mode that it must tolerate, by the border of stability.
-    #[must_use]
     pub fn tolerates(&self, law: ControlMode, tuning: &Tuning) -> bool {
         let loci = self.loci(law, tuning);
         self.needed(&loci) <= self.demand.damping_ratio

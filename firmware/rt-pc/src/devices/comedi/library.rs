@@ -53,7 +53,6 @@ pub enum Reference {
 }
 
 /// A channel with its range, as instructions name it.
-#[must_use]
 pub fn channel(number: u32, range: u32, reference: Reference) -> u32 {
     (reference as u32) << 24 | range << 16 | number
 }
@@ -168,14 +167,12 @@ impl Functions {
 
 impl Card<'_> {
     /// What the driver calls the card.
-    #[must_use]
     pub fn name(&self) -> String {
         // SAFETY: an open handle; the text lives as long as it.
         unsafe { text((self.library.functions.board_name)(self.handle)) }
     }
 
     /// Number and channels of the first subdevice of a kind.
-    #[must_use]
     pub fn subdevice(&self, kind: c_int) -> Option<(u32, u32)> {
         // SAFETY: an open handle and numbers.
         unsafe {
@@ -185,14 +182,12 @@ impl Card<'_> {
     }
 
     /// Highest code of a channel.
-    #[must_use]
     pub fn highest(&self, subdevice: u32, number: u32) -> u32 {
         // SAFETY: an open handle and numbers.
         unsafe { (self.library.functions.largest)(self.handle, subdevice, number) }
     }
 
     /// Number of the narrowest range of a channel that holds these voltages.
-    #[must_use]
     pub fn range(&self, subdevice: u32, number: u32, volts: [f64; 2]) -> Option<u32> {
         // SAFETY: an open handle and numbers.
         let found = unsafe {
@@ -212,14 +207,12 @@ impl Card<'_> {
     }
 
     /// Sets a digital line; false if it cannot.
-    #[must_use]
     pub fn set_line(&self, subdevice: u32, line: u32, on: bool) -> bool {
         // SAFETY: an open handle and numbers.
         unsafe { (self.library.functions.write_line)(self.handle, subdevice, line, c_uint::from(on)) >= 0 }
     }
 
     /// A digital line; none if it cannot be read.
-    #[must_use]
     pub fn line(&self, subdevice: u32, line: u32) -> Option<bool> {
         let mut bit: c_uint = 0;
         // SAFETY: an open handle, numbers, and a word that the library fills.
@@ -228,7 +221,6 @@ impl Card<'_> {
     }
 
     /// Sets the digital lines of `mask`, as `high` says, and reads all, from line `first` on, in one call; none if it cannot.
-    #[must_use]
     pub fn exchange_lines(&self, subdevice: u32, first: u32, mask: u32, high: u32) -> Option<u32> {
         let mut bits: c_uint = high;
         // SAFETY: an open handle, numbers, and a word that the library reads and fills.
@@ -244,7 +236,6 @@ impl Card<'_> {
     }
 
     /// Gives codes out one after the other in one call; false if not all were.
-    #[must_use]
     pub fn write<const N: usize>(&self, subdevice: u32, channels: &[u32; N], count: usize, codes: &[u32; N]) -> bool {
         let mut codes = *codes;
         self.perform(WRITE, subdevice, channels, count, &mut codes)

@@ -11,10 +11,6 @@ fn moving(to: [f64; 6]) -> Command<f64> {
     command(CommandKind::Move, to)
 }
 
-fn trajectory(selector: u32) -> Command<f64> {
-    Command { selector, ..command(CommandKind::Trajectory, [0.0; 6]) }
-}
-
 /// A generator with its bias behind it that has had `ticks` of a command.
 fn under(plan: &Setpoints64, order: &Command<f64>, ticks: u32) -> Generator<f64> {
     let mut generator = ready(plan);
@@ -26,8 +22,6 @@ fn under(plan: &Setpoints64, order: &Command<f64>, ticks: u32) -> Generator<f64>
 
 /// What is under way when the command comes.
 fn beginnings(plan: &Setpoints64) -> Vec<(&'static str, Generator<f64>)> {
-    let mut streamed = command(CommandKind::Stream, [0.1e-6, 0.0, 0.0, 0.0, 0.0, 0.0]);
-    (streamed.sequence, streamed.target.rate[0]) = (1, 1e-3);
     let mut bias = Generator::new();
     bias.next(plan, &hold());
     let mut stopping = under(plan, &moving(AWAY), 300);
@@ -39,7 +33,7 @@ fn beginnings(plan: &Setpoints64) -> Vec<(&'static str, Generator<f64>)> {
         ("hold elsewhere", under(plan, &moving(AWAY), 5000)),
         ("move", under(plan, &moving(AWAY), 300)),
         ("stop", stopping),
-        ("stream", under(plan, &streamed, 1)),
+        ("stream", under(plan, &streamed(1, 0.1e-6, 1e-3), 1)),
         ("approach", under(plan, &trajectory(1), 100)),
         ("another trajectory", under(plan, &trajectory(0), 6000)),
     ]

@@ -244,10 +244,7 @@ fn a_stop_before_a_wall_is_as_short_as_it_must_be_and_stays_inside() {
         if x > 40e-6 {
             break;
         }
-        let mut target = Target::at([x, 0.0, 0.0, 0.0, 0.0, 0.0]);
-        target.rate[0] = v;
-        let order = Command { kind: CommandKind::Stream, selector: 0, sequence, target };
-        let (target, status) = generator.next(&plan, &order);
+        let (target, status) = generator.next(&plan, &streamed(sequence, x, v));
         assert_eq!(status, 0);
         last = target;
     }
@@ -308,7 +305,7 @@ fn segments_follow_their_formula_and_its_derivatives() {
 fn a_table_is_a_spline_and_repeats_without_a_seam() {
     let plan = plan64();
     let mut generator = ready(&plan);
-    let order = Command { selector: 2, ..command(CommandKind::Trajectory, [0.0; 6]) };
+    let order = trajectory(2);
     run(&mut generator, &plan, &command(CommandKind::Move, [5e-6, 0.0, 0.0, 0.0, 0.0, 0.0]));
     let mut targets = Vec::new();
     for _ in 0..3 * 3200 {
@@ -340,10 +337,9 @@ fn a_stream_is_followed_at_once_and_a_jump_is_refused_and_held() {
     let plan = plan64();
     let mut generator = ready(&plan);
     let sample = |sequence: u32, x: f64, rate: f64| {
-        let mut target = Target::at([x, 0.0, 0.0, 0.0, 0.0, 0.0]);
-        target.rate[0] = rate;
-        target.acceleration[0] = 1e-3;
-        Command { kind: CommandKind::Stream, selector: 0, sequence, target }
+        let mut command = streamed(sequence, x, rate);
+        command.target.acceleration[0] = 1e-3;
+        command
     };
     let (target, status) = generator.next(&plan, &sample(1, 0.4e-6, 0.0));
     assert_eq!((target.pose, target.acceleration[0], status), (biased([0.4e-6, 0.0, 0.0, 0.0, 0.0, 0.0]), 1e-3, 0));
@@ -371,11 +367,7 @@ fn a_stream_that_pauses_is_continued_then_stale_and_comes_back_near_where_it_sto
     let plan = plan64();
     let mut generator = ready(&plan);
     let v = 1e-3;
-    let sample = |sequence: u32, x: f64| {
-        let mut target = Target::at([x, 0.0, 0.0, 0.0, 0.0, 0.0]);
-        target.rate[0] = v;
-        Command { kind: CommandKind::Stream, selector: 0, sequence, target }
-    };
+    let sample = |sequence: u32, x: f64| streamed(sequence, x, v);
     let mut x = 0.0;
     for sequence in 1..=20 {
         x += v * PERIOD;

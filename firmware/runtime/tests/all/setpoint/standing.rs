@@ -17,13 +17,6 @@ fn go(generator: &mut Generator<f64>, plan: &Setpoints64, order: &Command<f64>, 
     last
 }
 
-fn streamed(sequence: u32, x: f64, rate: f64) -> Command<f64> {
-    let mut order = command(CommandKind::Stream, [x, 0.0, 0.0, 0.0, 0.0, 0.0]);
-    order.sequence = sequence;
-    order.target.rate[0] = rate;
-    order
-}
-
 /// A generator in each of its phases, whether it has to stop, and whether the bias is behind it.
 fn phases(plan: &Setpoints64) -> Vec<(&'static str, Generator<f64>, bool, bool)> {
     let reset = Generator::new();
@@ -35,7 +28,6 @@ fn phases(plan: &Setpoints64) -> Vec<(&'static str, Generator<f64>, bool, bool)>
         go(&mut generator, plan, &order, ticks);
         generator
     };
-    let trajectory = |selector: u32| Command { selector, ..command(CommandKind::Trajectory, [0.0; 6]) };
     let moving = with(command(CommandKind::Move, [20e-6, 0.0, 0.0, 0.0, 0.0, 0.0]), 300);
     let mut stopping = with(streamed(1, 0.1e-6, 1e-3), 1);
     go(&mut stopping, plan, &hold(), 1);

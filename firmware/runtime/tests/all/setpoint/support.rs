@@ -123,6 +123,18 @@ pub fn hold<T: Real>() -> Command<T> {
     command(CommandKind::Hold, [0.0; 6])
 }
 
+/// A stored trajectory.
+pub fn trajectory(selector: u32) -> Command<f64> {
+    Command { selector, ..command(CommandKind::Trajectory, [0.0; 6]) }
+}
+
+/// A set-point of a stream along x, with its rate.
+pub fn streamed(sequence: u32, x: f64, rate: f64) -> Command<f64> {
+    let mut command = Command { sequence, ..command(CommandKind::Stream, [x, 0.0, 0.0, 0.0, 0.0, 0.0]) };
+    command.target.rate[0] = rate;
+    command
+}
+
 pub fn doubles<T: Real + Into<f64>>(values: [T; 6]) -> [f64; 6] {
     values.map(Into::into)
 }

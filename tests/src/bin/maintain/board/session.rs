@@ -234,6 +234,11 @@ impl Host {
         }
     }
 
+    /// Sends commands one after the other, each when the words of those before it have come.
+    pub fn orders(&mut self, all: &[(&str, &str)]) -> Result<(), String> {
+        all.iter().try_for_each(|(orders, words)| self.order(orders, words).map(drop))
+    }
+
     pub fn end(&mut self) {
         end(&mut self.process);
     }

@@ -22,7 +22,6 @@ impl ClosedLoop {
 
     /// Response of the readings at the end of an interval to the correction for that interval, both in modal coordinates, at each of
     /// the angles ωT_s: T(z) = z C (z − A)⁻¹ B of the transition A, row by row, as (real, imaginary).
-    #[must_use]
     pub fn correction_response(
         &self,
         law: ControlMode,
@@ -43,7 +42,6 @@ impl ClosedLoop {
     }
 
     /// Readings at the end of each interval under open-loop requests, all in modal coordinates, from rest.
-    #[must_use]
     pub fn without_feedback(&self, requests: &[[f64; 6]]) -> Vec<[f64; 6]> {
         let law = ControlMode::F(Law::Invhys);
         let (transition, input) = self.driven(law, &Tuning::NONE, &Conditions::NOMINAL, false);
@@ -57,7 +55,6 @@ impl ClosedLoop {
 
     /// Closed-loop error for an error that the readings would have at the start of each interval without feedback, from rest, all in
     /// modal coordinates.
-    #[must_use]
     pub fn left(&self, law: ControlMode, tuning: &Tuning, errors: &[[f64; 6]]) -> Vec<[f64; 6]> {
         let (transition, input) = self.driven(law, tuning, &Conditions::NOMINAL, true);
         let shown = shown(self.lags_used()[1]);

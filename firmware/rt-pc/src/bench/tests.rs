@@ -19,6 +19,7 @@ use crate::control::{Loop, Timing};
 use crate::devices::{Contacts, Device};
 use crate::handover::{LoopCommand, OperatorRequest, Outer, Row, Shared, rings};
 use crate::operator::SupervisorReport;
+use crate::options::{self, Invocation, Options};
 
 /// Gauges in the middle of their range.
 const MIDDLE: i32 = 1 << 16;
@@ -129,6 +130,31 @@ impl Bench {
         self.calls.push((self.tick, call));
         if fails { Err(fault) } else { Ok(()) }
     }
+}
+
+/// What a command line asks for.
+pub fn parsed(line: &str) -> Result<Invocation, String> {
+    options::parse(std::iter::once("rt-pc").chain(line.split_whitespace()).map(Into::into))
+}
+
+/// Options of a run.
+pub fn options(line: &str) -> Options {
+    match parsed(line) {
+        Ok(Invocation::Run(options)) => *options,
+        other => panic!("{line}: {other:?}"),
+    }
+}
+
+/// The first words of each block of a file of records.
+pub fn blocks(bytes: &[u8]) -> Vec<[u64; 5]> {
+    let word = |at: usize| u64::from_le_bytes(bytes[at..at + 8].try_into().unwrap());
+    let mut at = 16 + (word(8) >> 32) as usize + 8;
+    let mut blocks = Vec::new();
+    while at < bytes.len() {
+        blocks.push([0, 8, 16, 24, 32].map(|place| word(at + place)));
+        at += (word(at + 8) as usize + 1) * 8;
+    }
+    blocks
 }
 
 /// Row of a tick of an idle machine.
