@@ -44,7 +44,7 @@ fn random(seed: u64) -> Bench {
     let jacobian = std::array::from_fn(|leg| {
         let side = if leg % 2 == 0 { 1.0 } else { -1.0 };
         let at = |radius: f64, angle: f64, z: f64| Vector3::new(radius * angle.cos(), radius * angle.sin(), z);
-        let third = std::f64::consts::TAU / 3.0 * ((leg + 1) / 2) as f64;
+        let third = std::f64::consts::TAU / 3.0 * leg.div_ceil(2) as f64;
         let upper = at(platform, third + side * between(0.05, 0.1) - std::f64::consts::FRAC_PI_3, 0.0);
         let lower = at(base, std::f64::consts::TAU / 3.0 * (leg / 2) as f64 - side * between(0.05, 0.1), -height);
         let along = (upper - lower).normalize();
@@ -56,10 +56,10 @@ fn random(seed: u64) -> Bench {
     let [low, high] = voltage;
     let rest = if low > 0.0 { low } else { 0.0 };
     let stroke = between(30e-6, 75e-6);
-    let room = between(0.9, 1.3) * stroke;
+    let room = between(0.4, 1.0) * stroke;
     // Poses count from the lowest voltage: a machine that rests above it is given room for that.
     let raised = 1.0 + (rest - low) / (high - low);
-    let tilt = between(5.0, 9.0) * room;
+    let tilt = between(4.0, 9.0) * room;
     let workspace = [room, room, room, tilt, tilt, 1.4 * tilt].map(|bound| [-raised * bound, raised * bound]);
     Bench {
         tick_rate: [1e3, 4e3, 1e4, 2e4][pick(between(0.0, 1.0), 4)],
@@ -248,6 +248,8 @@ fn what_cannot_be_planned_is_said() {
     assert!(refused(Bench { slew_rate: 0.0, ..reference() }, 32).contains("slew rate: expected more than 0"));
     assert!(refused(Bench { rest: -3.0, ..reference() }, 32).contains("rest: expected a voltage from 0 V to 100 V"));
     assert!(refused(Bench { jacobian: [[1.0; 6]; 6], ..reference() }, 32).contains("do not determine the pose"));
-    let tiny = refused(Bench { workspace: [[-1e-6, 1e-6]; 6], ..reference() }, 32);
+    let tiny = refused(Bench { workspace: [[-3e-6, 3e-6]; 6], ..reference() }, 32);
     assert!(tiny.starts_with("leg 0: ") && tiny.contains("widen `workspace`"), "{tiny}");
+    let raised = refused(Bench { voltage: [-100.0, 100.0], stroke: [126e-6; 6], ..reference() }, 32);
+    assert!(raised.starts_with("at rest, 0 V, the platform is beyond"), "{raised}");
 }

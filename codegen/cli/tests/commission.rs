@@ -37,7 +37,9 @@ fn a_plan_is_shown_first_and_one_that_leaves_the_workspace_is_refused() {
     let run = folder.run(&["commission", "reference.toml", "--plan"]);
     assert!((5.0..=15.0).contains(&minutes(&run.stdout)), "{run:?}");
     folder.run(&["commission", "reference.toml", "--yes"]).says(2, &["name the device with --port or --socket"]);
-    folder.spec("narrow.toml", &[("[\"50 um\", \"50 um\", \"52 um\"]", "[\"20 um\", \"20 um\", \"52 um\"]")]);
+    let rotation = "[\"0.4 mrad\", \"0.35 mrad\", \"0.5 mrad\"]";
+    let narrow = folder.read("reference.toml").replacen(rotation, "[\"0.1 mrad\", \"0.1 mrad\", \"0.1 mrad\"]", 1);
+    folder.write("narrow.toml", narrow);
     let narrow = folder.run(&["commission", "narrow.toml", "--plan"]);
     narrow.says(1, &["the platform would leave its workspace", "nothing was sent"]);
     folder.run(&["commission", "legs.toml", "--plan"]).says(2, &["expected a spec with [control]"]);
@@ -79,6 +81,6 @@ fn a_step_runs_alone_is_kept_and_an_interrupt_ramps_down() {
     assert!(board.is(Phase::Disarmed) && !folder.path("commission/leg0-cross-talk.csv").exists());
     assert!(state(&folder)["steps"]["cross-talk"].is_null());
     // Another spec has another folder.
-    folder.spec("other.toml", &[("mass           = \"1.195 kg\"", "mass           = \"1.2 kg\"")]);
+    folder.write("other.toml", folder.read("reference.toml").replacen("1.195 kg", "1.2 kg", 1));
     folder.run(&["commission", "other.toml", "--report"]).says(1, &["has records of another spec", "--again"]);
 }

@@ -21,7 +21,6 @@ use specgen_language::model::{Model, TaskSpace};
 pub use boxes::Boxes;
 pub use conditioning::Conditioning;
 pub use findings::describe;
-pub(crate) use travel::coupled;
 
 /// Interior poses that are checked in addition to the corners.
 const INTERIOR_POSES: u32 = 128;

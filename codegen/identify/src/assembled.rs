@@ -15,8 +15,9 @@ mod timing;
 mod wave;
 
 use specgen_language::model::MAX_GRID;
+use specgen_numerics::largest;
 
-use groups::{Group, groups};
+use groups::{Group, Search};
 use timing::Timing;
 use wave::{Shape, Tone, Wave};
 
@@ -185,8 +186,9 @@ impl Drive {
 pub fn plan(bench: &Bench, grid: usize, pairs: bool) -> Result<Plan, String> {
     check(bench, grid)?;
     let planner = Planner { bench, limits: bench.permitted() };
-    let groups = groups(bench, planner.limits, planner.fastest(grid), pairs)?;
-    let mut drives: Vec<Drive> = (0..6).map(|leg| planner.cross_talk(leg)).collect();
+    let search = Search::new(bench, planner.limits, planner.fastest(grid))?;
+    let groups = search.groups(pairs)?;
+    let mut drives: Vec<Drive> = (0..6).map(|leg| planner.cross_talk(leg, &search)).collect();
     for group in &groups {
         drives.extend([planner.preconditioning(group), planner.curves(group, grid, None)]);
         for (part, crossing) in OTHER_SETS {
@@ -272,12 +274,15 @@ impl Planner<'_> {
         Shape::Strokes { ticks: ticks.ceil(), count }
     }
 
-    fn cross_talk(&self, leg: usize) -> Drive {
+    /// The other legs rest: a record in which they move is refused.
+    fn cross_talk(&self, leg: usize, search: &Search) -> Drive {
         let ([low, high], rest) = (self.limits, self.bench.rest);
         let [volts, seconds, span] = [STROKE.0, STROKE.1, 0.5 * (high - low)];
-        let volts = if volts < span { volts } else { span };
         // Away from the nearer limit.
-        let range = if high - rest > rest - low { [rest, rest + volts] } else { [rest - volts, rest] };
+        let upward = high - rest > rest - low;
+        let range = |volts: f64| if upward { [rest, rest + volts] } else { [rest - volts, rest] };
+        let volts = if volts < span { volts } else { span };
+        let range = range(largest(volts, |volts| search.stays(&[leg], range(volts))));
         let group = Group { legs: vec![leg], held: [rest; 6], range, share: 1.0 };
         let shape = self.strokes(range, seconds, STROKE.2);
         Drive { rest_before: CREEP_BACK, ..self.drive(&group, Kind::CrossTalk, shape, RAMP) }

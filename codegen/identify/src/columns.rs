@@ -76,6 +76,8 @@ pub(crate) struct Column<'a> {
 pub(crate) struct Lines<'a> {
     format: &'a Format,
     names: Vec<String>,
+    /// Those that are not empty, sorted.
+    sorted: Vec<String>,
     /// Number of the names, or of the fields of the first row if there are none.
     count: usize,
     separator: u8,
@@ -175,6 +177,7 @@ pub(crate) fn open_part<'a>(
     let lines = Lines {
         format,
         names: head.names.clone(),
+        sorted: sorted(&head.names),
         count,
         separator: head.separator,
         clock: None,
@@ -199,6 +202,13 @@ fn cut_clock(head: &Head, lines: &[Line]) -> Option<usize> {
     let mut rows = lines.iter().filter(|(_, line)| has_fields(line));
     let first = rows.next().filter(|_| head.separator == b',').filter(is_cut)?;
     rows.all(|row| is_cut(&row)).then_some(first.0)
+}
+
+/// The names that are not empty, in their order of letters.
+fn sorted(names: &[String]) -> Vec<String> {
+    let mut names: Vec<String> = names.iter().filter(|name| !name.is_empty()).cloned().collect();
+    names.sort_unstable();
+    names
 }
 
 /// Whether a line of `text` has a value in column `at`.
@@ -339,17 +349,16 @@ impl Lines<'_> {
         is_long.then_some(ONE_EACH).or_else(|| misaligned(fields, self.count, separator))
     }
 
-    /// Refuses a comment between the rows that names the columns otherwise than the header.
+    /// Refuses a comment between the rows that names the columns in another order than the header, or other ones.
     fn check_comment(&self, comment: &[u8], line: usize, findings: &mut Findings) {
         let own = names_of(comment);
-        let sorted = |names: &[String]| {
-            let mut names = names.to_vec();
-            names.sort_unstable();
-            names
-        };
-        let is_header =
-            own.iter().filter(|name| names::has_unit(name)).count() > 1 || sorted(&own) == sorted(&self.names);
-        if own.len() > 1 && is_header && own != self.names && !self.names.is_empty() {
+        if own.len() < 2 || self.names.is_empty() {
+            return;
+        }
+        let pairs = || own.iter().zip(&self.names);
+        let has_units = own.iter().filter(|name| names::has_unit(name)).count() > 1;
+        let has_others = has_units && pairs().any(|(own, name)| !own.is_empty() && !names::are_alike(own, name));
+        if has_others || pairs().any(|(own, name)| own != name) && sorted(&own) == self.sorted {
             let message =
                 format!("a comment names the columns below it otherwise than the header: `{}`", own.join(","));
             let help = "write these rows into a file of their own";

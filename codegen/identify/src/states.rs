@@ -209,7 +209,11 @@ mod tests {
             (usual.replace("alpha_z", "theta_z_dot_rpm"), row("0"), "the unit of `theta_z_dot_rpm`"),
             (usual.clone(), format!("7,{}", row("0.5")), "has 19 values, expected 18"),
             (usual.clone(), ["0,5"; 18].join(","), "has 36 values, expected 18"),
-            (usual.replace(',', ";"), ["1,234"; 18].join(";"), "the comma may divide thousands"),
+            (
+                usual.replace(',', ";"),
+                [["1"; 18], ["1,234"; 18]].map(|row| row.join(";")).join("\n"),
+                "the comma may divide thousands",
+            ),
             (format!("{usual}\n{}", ["mm"; 18].join(",")), row("0"), "the unit of `rx [mm]`"),
         ] {
             let found = parse(&format!("{names}\n{row}\n"), "s.csv").unwrap_err();

@@ -202,12 +202,13 @@ mod tests {
             ("x_um,theta_x_urad\num,mrad\n0,1\n1,2\n", "`theta_x_urad [mrad]` is not a column"),
             ("x_um,y_um\nmm,mm\n0,1\n1,2\n", "`x_um [mm]` is not a column"),
             ("x_um,-y_um\n0,1\n1,2\n", "`-y_um` is not a column"),
-            ("x_um;y_um\n0;1,250\n1;2,500\n", "`y_um` is `1,250`: the comma may divide thousands"),
+            ("x_um;y_um\n0;999\n1;2,500\n", "`y_um` is `2,500`: the comma may divide thousands"),
             ("x_um,y_um\n0,5,0\n1,5,0\n", "has 3 values, expected 2"),
             ("x_um,y_um\n0,1\n# y_um,x_um\n1,2\n", "a comment names the columns"),
         ] {
             assert!(refused(text)[0].contains(words), "{:?}", refused(text));
         }
+        assert!(parse("x_um;y_um\n0;1,250\n1;2,500\n", "w.csv", 1e-3).is_ok());
         assert!(parse("x_um;y_um\n0,000;1,250\n1,000;2,500\n", "w.csv", 1e-3).is_ok());
     }
 

@@ -10,6 +10,12 @@ pub fn displacements(platform: &Platform<f64>, pose: &[f64; 6]) -> [f64; 6] {
     platform.displacements(pose)
 }
 
+/// Displacements of the legs with their cross-talk E, if any: (I + E) l. E has rows by leg, m/m; m in and out.
+pub fn coupled(cross_talk: Option<&[[f64; 6]; 6]>, l: [f64; 6]) -> [f64; 6] {
+    let Some(e) = cross_talk else { return l };
+    core::array::from_fn(|leg| e[leg].iter().zip(&l).fold(l[leg], |sum, (e, l)| sum + e * l))
+}
+
 /// ∂l/∂h at `pose` (m and rad), a row by leg, m/m and m/rad: [`Platform::jacobian`].
 pub fn jacobian(platform: &Platform<f64>, pose: &[f64; 6]) -> [[f64; 6]; 6] {
     platform.jacobian(pose)

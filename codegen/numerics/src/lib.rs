@@ -55,7 +55,8 @@ pub use exponential::exponential;
 pub use form::magnitude;
 pub use jury::{ewma_limit, pcc_limit};
 pub use kernels::{
-    Kernels, coriolis, displacements, expand_leg_forces, gravity, jacobian, leg_forces, mass_matrix, pivot_ratio,
+    Kernels, coriolis, coupled, displacements, expand_leg_forces, gravity, jacobian, leg_forces, mass_matrix,
+    pivot_ratio,
 };
 pub use loci::{ComplexMatrix, Loci, complex_eigenvalues, product};
 pub use matrix::{Matrix, Matrix6, multiply6, transpose6};

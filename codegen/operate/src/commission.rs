@@ -28,10 +28,11 @@ use serde_json::Value;
 use specgen_compiler::compile::Compilation;
 use specgen_compiler::lower;
 use specgen_identify::assembled::{Drive, Kind, Plan};
+use specgen_language::files;
 use specgen_language::interrupt;
 use specgen_language::model::LegModelKind;
 use specgen_language::outcome::{Failure, Outcome};
-use specgen_language::output::{check_edit, edit_file, write_file};
+use specgen_language::output::{check_edit, edit_file, unread_file, write_file};
 use specgen_language::ui::Ui;
 
 use crate::commands::SessionError;
@@ -97,6 +98,7 @@ pub fn run(line: Option<Line<'_>>, options: &Options, compiled: &Compilation, ui
     if moves && !options.plan && line.is_none() {
         return Err(Failure::Usage("name the device with --port or --socket, or give --plan".to_owned()));
     }
+    writable(&steps, commissioned, options)?;
     if moves && !work.permitted(&steps, &state)? {
         return Ok(());
     }
@@ -182,6 +184,20 @@ fn chosen(state: &mut State, options: &Options, commissioned: bool) -> Vec<Step>
     all.filter(|step| !state.is_over(*step)).collect()
 }
 
+/// Refuses, before the machine moves, steps whose results could not be written: the tables of the legs are inputs of the
+/// commissioned spec, which is written with them or not at all.
+fn writable(steps: &[Step], commissioned: bool, options: &Options) -> Result<(), Failure> {
+    let has = |step: Step| steps.contains(&step);
+    if !commissioned || !(has(Step::Identify) || has(Step::Spec)) || has(Step::Spec) && options.write {
+        return Ok(());
+    }
+    Err(Failure::Usage(
+        "the spec is the commissioned one and names the tables of its legs: give the first spec, or --step identify --step \
+         spec --write"
+            .to_owned(),
+    ))
+}
+
 /// What every step needs.
 struct Work<'a> {
     line: Option<Line<'a>>,
@@ -239,7 +255,13 @@ impl Work<'_> {
                         if at > 0 {
                             machine::arm(machine, ui)?;
                         }
-                        machine.record_rows(every, [0.0, REST[0]], &record(folder, name), &mut |_| Ok(()), ui)?;
+                        machine.record_rows(
+                            (every, u32::MAX),
+                            [0.0, REST[0]],
+                            &record(folder, name),
+                            &mut |_| Ok(()),
+                            ui,
+                        )?;
                     }
                     Ok(())
                 })?;
@@ -318,11 +340,18 @@ impl Work<'_> {
         let (text, new) =
             self.ui.during("compiling the commissioned spec", || spec::edited(self.compiled, state, &folder, dir))?;
         if *write {
+            if files::text(path).map_err(|unread| unread_file(path, &unread))? != source.text {
+                return Err(Failure::Gate(format!(
+                    "{} was changed meanwhile: repeat with --step spec --write",
+                    source.display_name
+                )));
+            }
             edit_file(path, text.as_bytes())?;
         } else {
             write_file(&output.join("platform.toml"), text.as_bytes())?;
         }
         state.written = Some(new.ir.digest);
+        state.forget(Step::Acceptance);
         Ok(())
     }
 
@@ -343,7 +372,12 @@ impl Work<'_> {
 
     /// The same of all steps that were done.
     fn evaluate(&self, state: &mut State) -> Result<(), Failure> {
-        let done = |step: &Step| state.steps.get(step).is_some_and(|passed| passed.skipped.is_none());
+        // Figures of the commissioned controller have its limits.
+        let other = state.written.as_ref().is_some_and(|written| *written != self.compiled.ir.digest);
+        let done = |step: &Step| {
+            state.steps.get(step).is_some_and(|passed| passed.skipped.is_none())
+                && !(other && *step == Step::Acceptance)
+        };
         let steps: Vec<Step> = Step::ALL.into_iter().filter(done).collect();
         steps.into_iter().try_for_each(|step| self.evaluate_step(step, state))
     }

@@ -12,8 +12,7 @@ pub fn of(compiled: &Compilation) -> String {
     let mut text = String::new();
     let assumed = compiled.assumptions.summary();
     if !assumed.is_empty() {
-        // Writing to a String cannot fail, here and below.
-        let _ = writeln!(text, "  not measured: {assumed}");
+        text += &format!("  not measured: {assumed}\n");
         compiled.assumptions.list().iter().for_each(|one| text.push_str(&format!("    {one}\n")));
     }
     for (name, report) in compiled.model.hysteresis.records.iter().zip(&compiled.records) {

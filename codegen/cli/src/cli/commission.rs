@@ -26,7 +26,7 @@ pub struct Arguments {
     /// Do only this step: wiring, cross-talk, curves, identify, spec or acceptance. May be repeated.
     #[arg(long, value_name = "STEP", value_parser = Step::parse)]
     step: Vec<Step>,
-    /// Do the steps again, all or those of --step, and those that depend on them: their records are replaced.
+    /// Do the steps again, all or those of --step: their records are replaced, and later steps are open again.
     #[arg(long)]
     again: bool,
     /// Skip a step, such as curves="identified before"; the page names the reason.

@@ -172,7 +172,7 @@ Examples:
   specgen commission commission/platform.toml --socket rt.sock  # (board)
       once the machine runs that controller: acceptance
   specgen commission platform.toml --socket rt.sock --again  # (board)
-      all of it again; with --step curves, the curves and what depends on them
+      all of it again; with --step curves, the curves: later steps are open again
   specgen commission platform.toml --step spec --write  # (board)
       the results into platform.toml itself
 

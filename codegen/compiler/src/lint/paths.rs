@@ -3,12 +3,11 @@
 //! Jumps, corners, speed and position of a path are checked where it is lowered, its reach in [`crate::reach`].
 
 use serde::Serialize;
-use specgen_numerics::{displacements, mass_matrix};
+use specgen_numerics::{coupled, displacements, mass_matrix};
 use specgen_runtime::Platform;
 
 use super::{Findings, Legs, figure};
 use crate::lower::setpoint::Stretch;
-use crate::reach::coupled;
 use specgen_language::diagnostic::Diagnostic;
 use specgen_language::model::{Model, TaskSpace};
 

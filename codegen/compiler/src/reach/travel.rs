@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix6, Vector6};
 use specgen_language::model::Model;
-use specgen_numerics::{displacements, jacobian, largest};
+use specgen_numerics::{coupled, displacements, jacobian, largest};
 use specgen_runtime::Platform;
 
 use super::{INTERIOR_POSES, PathReach, Pose, wider};
@@ -11,12 +11,6 @@ use super::{INTERIOR_POSES, PathReach, Pose, wider};
 const LARGEST_ANGLE: f64 = core::f64::consts::FRAC_PI_4;
 /// Tolerance of the stroke, as a share of it: rounding must not refuse a path that starts at rest.
 const SLACK: f64 = 1e-9;
-
-/// Displacements of the legs with their cross-talk E: (I + E) l. E has rows by leg, m/m; m in and out.
-pub(crate) fn coupled(cross_talk: Option<&[[f64; 6]; 6]>, l: [f64; 6]) -> [f64; 6] {
-    let Some(e) = cross_talk else { return l };
-    core::array::from_fn(|leg| e[leg].iter().zip(&l).fold(l[leg], |sum, (e, l)| sum + e * l))
-}
 
 pub(super) struct Legs<'a> {
     pub(super) platform: &'a Platform<f64>,

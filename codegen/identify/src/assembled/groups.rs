@@ -46,27 +46,12 @@ struct HalfSpace {
     most: f64,
 }
 
-struct Search<'a> {
+pub(super) struct Search<'a> {
     bench: &'a Bench,
     limits: Vec<Limit>,
     permitted: [f64; 2],
     /// Voltage that a leg may go on, V.
     ahead: f64,
-}
-
-/// All six legs in groups, for voltages within `permitted` (V) and rates up to `fastest` (V/s). With `pairs`, as few
-/// groups as there can be; among these, those whose other legs stay nearest to rest.
-pub(super) fn groups(bench: &Bench, permitted: [f64; 2], fastest: f64, pairs: bool) -> Result<Vec<Group>, String> {
-    let search = Search { bench, limits: limits(bench)?, permitted, ahead: AHEAD * fastest };
-    let singles: Vec<Group> = (0..6).map(|leg| search.alone(leg)).collect::<Result<_, _>>()?;
-    if !pairs {
-        return Ok(singles);
-    }
-    let pairs: Vec<Group> =
-        (0..6).flat_map(|a| (a + 1..6).map(move |b| [a, b])).filter_map(|legs| search.group(&legs, 1.0)).collect();
-    let mut best = singles.clone();
-    extend(&[pairs, singles].concat(), bench.rest, &mut Vec::new(), &mut best);
-    Ok(best)
 }
 
 /// Tries every way to put the remaining legs into groups.
@@ -113,7 +98,34 @@ fn limits(bench: &Bench) -> Result<Vec<Limit>, String> {
     poses.chain(bench.readings.iter().copied()).map(limit).collect()
 }
 
-impl Search<'_> {
+impl<'a> Search<'a> {
+    /// For voltages within `permitted` (V) and rates up to `fastest` (V/s).
+    pub(super) fn new(bench: &'a Bench, permitted: [f64; 2], fastest: f64) -> Result<Self, String> {
+        let search = Self { bench, limits: limits(bench)?, permitted, ahead: AHEAD * fastest };
+        if search.stays(&[], [bench.rest; 2]) {
+            Ok(search)
+        } else {
+            Err(format!("at rest, {} V, the platform is beyond its workspace; widen `workspace`", bench.rest))
+        }
+    }
+
+    /// All six legs. With `pairs`, as few groups as there can be; among these, those whose other legs stay nearest to rest.
+    pub(super) fn groups(&self, pairs: bool) -> Result<Vec<Group>, String> {
+        let singles: Vec<Group> = (0..6).map(|leg| self.alone(leg)).collect::<Result<_, _>>()?;
+        if !pairs {
+            return Ok(singles);
+        }
+        let pairs = (0..6).flat_map(|a| (a + 1..6).map(move |b| [a, b])).filter_map(|legs| self.group(&legs, 1.0));
+        let mut best = singles.clone();
+        extend(&pairs.chain(singles).collect::<Vec<_>>(), self.bench.rest, &mut Vec::new(), &mut best);
+        Ok(best)
+    }
+
+    /// Whether `legs` may go through `range` (V) while the others rest.
+    pub(super) fn stays(&self, legs: &[usize], range: [f64; 2]) -> bool {
+        self.half_spaces(legs, range).iter().all(|space| space.most >= 0.0)
+    }
+
     /// The leg alone, over as much of its range as fits.
     fn alone(&self, leg: usize) -> Result<Group, String> {
         let share = largest(1.0, |share| self.group(&[leg], share).is_some());

@@ -137,11 +137,11 @@ impl Wave {
                 (half, format!("kind = \"multisine\", tones = [{}]", all.join(", ")))
             }
         };
-        for leg in 0..6 {
+        for (leg, volts) in held.iter().enumerate() {
             let (offset, shape) = if legs.contains(&leg) {
                 (low - self.rest + above, shape.as_str())
             } else {
-                (held[leg] - self.rest, "kind = \"constant\"")
+                (volts - self.rest, "kind = \"constant\"")
             };
             // Writing to a String cannot fail.
             let _ = write!(text, "\n[[axis]]\naxis = {leg}\noffset = {offset:?}\nshape = {{ {shape} }}\n");

@@ -2,7 +2,7 @@
 //! another meaning than their places say.
 
 use super::head::{BLANK, Head, Line, decoded, has_fields, is_row, split};
-use super::number::number;
+use super::number::{clock, is_date, number};
 
 /// Rows that are checked for decimal commas.
 const ROWS: usize = 10;
@@ -14,8 +14,9 @@ impl Head {
         let rows: Vec<&Line> = lines.iter().filter(|(_, line)| has_fields(line)).take(ROWS).collect();
         let all = |is: &dyn Fn(&[u8]) -> bool| rows.iter().all(|(_, line)| is(line));
         // Without names, `0,007` has the digits of decimals.
-        let has_decimals =
-            |fields: &[&[u8]]| fields.iter().skip(1).any(|field| matches!(field, [b'0', b'0'..=b'9', ..]));
+        let is_decimals = |field: &&[u8]| matches!(field, [b'0', _, ..]) && field.iter().all(u8::is_ascii_digit);
+        let is_time = |field: &&[u8]| is_date(field) || clock(&decoded(field)).is_some();
+        let has_decimals = |fields: &[&[u8]]| fields.iter().skip(1).any(is_decimals) && !fields.iter().any(is_time);
         let is_ambiguous = match count {
             0 => !all(&|line| !has_decimals(&split(line, b','))),
             _ => all(&|line| filled(&split(line, b',')) > count),

@@ -55,10 +55,12 @@ pub(super) fn find(lines: &[Line], preamble: bool) -> Option<Head> {
     }
     let known = |at: usize| names_of(&lines[at].1).iter().filter(|name| names::is_known(name)).count();
     let interval = lines.iter().find_map(|(_, line)| interval(line));
-    if let Some(at) = (first..lines.len()).find(|&at| known(at) > 1) {
+    let row = (first..lines.len()).find(|&at| separator_of(&lines[at].1).is_some());
+    // A comment behind a row is not above it.
+    let is_above = |at: usize| row.is_none_or(|row| at < row) || !is_comment(&lines[at].1);
+    if let Some(at) = (first..lines.len()).find(|&at| is_above(at) && known(at) > 1) {
         return Some(at_line(lines, at, interval));
     }
-    let row = (first..lines.len()).find(|&at| separator_of(&lines[at].1).is_some());
     let above = |row: usize, fits: &dyn Fn(&[u8]) -> bool| (0..row).rev().find(|&at| fits(&lines[at].1));
     match row {
         // Some programs write the names into the last comment.
@@ -379,6 +381,8 @@ mod tests {
             ("Time,s,Ch1,V\n0,1\n", 1, &["Time,s", "Ch1,V"], b','),
             ("# time_s drive_V\n0.1 2\n", 1, &["time_s", "drive_V"], b' '),
             ("0;1\n2;3\n", 1, &[], b';'),
+            ("0;1\n# time_s;drive_V\n2;3\n", 1, &[], b';'),
+            ("bench\n# time_s;drive_V\n2;3\n", 2, &["time_s", "drive_V"], b';'),
             ("drve_V,t_s\nx,1\n0,1\n", 1, &["drve_V", "t_s"], b','),
             ("time_s;drive_V\n", 1, &["time_s", "drive_V"], b';'),
             ("Time s,Drive V,Position um\n0,1,2,\n", 1, &["Time s", "Drive V", "Position um"], b','),

@@ -204,6 +204,8 @@ pub(crate) fn per_denominator(header: &str, denominator: &str) -> Result<f64, St
     match (kind(&own), kind(&denominator)) {
         _ if denominator.is_empty() || own == denominator => Ok(1.0),
         (Some((a, own)), Some((b, other))) if a == b => Ok(own / other),
+        // `count` and `counts`.
+        (None, None) if own.trim_end_matches('s') == denominator.trim_end_matches('s') => Ok(1.0),
         _ if own_unit(header).is_some() || has_unknown_unit(header) => Err(own),
         _ => Ok(1.0),
     }
@@ -246,10 +248,16 @@ pub(crate) fn has_unknown_unit(header: &str) -> bool {
     let is_short = |text: &str| (1..=UNKNOWN).contains(&text.chars().count()) && !text.contains([',', ':']);
     let is_word = |text: &str| FOREIGN.contains(&text);
     let is_unknown = |text: &str| kind(text).is_none() && text.parse::<f64>().is_err();
-    match unit_in_brackets(header) {
+    match unit_in_brackets(header).filter(|text| !is_remark(text)) {
         Some(text) => is_unknown(&text) && (is_short(&text) || text.contains('/') || is_word(&text)),
         None => parts(header).1.is_some_and(|text| is_word(&text)),
     }
+}
+
+/// Whether a text in brackets says which one of several signals a column has, such as `raw` or `ch1`.
+fn is_remark(text: &str) -> bool {
+    let channel = text.trim_end_matches(|c: char| c.is_ascii_digit());
+    REMARKS.contains(&text) || channel.len() < text.len() && CHANNELS.contains(&channel)
 }
 
 /// `name` with a unit that is stated beside it, if that is not the one of the name.
@@ -277,6 +285,18 @@ pub(crate) fn is_sample_number(header: &str) -> bool {
 /// Whether a header names a quantity or a coordinate with its unit.
 pub(crate) fn has_unit(header: &str) -> bool {
     QUANTITIES.iter().chain(&COORDINATES).any(|quantity| quantity.fits(header).is_some())
+}
+
+/// Whether two headers name one quantity in one unit, or are none of a quantity and differ only in size and signs.
+pub(crate) fn are_alike(one: &str, other: &str) -> bool {
+    let known = |header: &str| {
+        let mut all = QUANTITIES.iter().chain(&COORDINATES);
+        all.find_map(|quantity| quantity.fits(header).map(|(_, per)| (quantity.name, per)))
+    };
+    match (known(one), known(other)) {
+        (None, None) => plain(one) == plain(other),
+        (one, other) => one == other,
+    }
 }
 
 /// Whether a header names any quantity of a record.
@@ -322,8 +342,12 @@ const UNKNOWN: usize = 4;
 /// Units of no quantity here, in or without brackets.
 const FOREIGN: [&str; 12] =
     ["counts", "count", "ticks", "steps", "digits", "lsb", "percent", "%", "ft", "rpm", "mdeg", "oe"];
+/// Remarks in brackets that are as short as units.
+const REMARKS: [&str; 9] = ["act", "raw", "avg", "mean", "set", "cmd", "ref", "ist", "soll"];
+/// Letters of channels, before a number.
+const CHANNELS: [&str; 5] = ["ch", "ai", "ao", "adc", "dac"];
 /// Minus signs: of programs, of typesetting, and what some make of it.
-pub(super) const MINUS: [char; 3] = ['-', '\u{2212}', '\u{2013}'];
+pub(crate) const MINUS: [char; 3] = ['-', '\u{2212}', '\u{2013}'];
 
 fn unit(given: &str) -> String {
     // `Â` is the first half of a UTF-8 µ that was read as Latin-1.
@@ -402,6 +426,14 @@ mod tests {
         assert_eq!(per_denominator("CH2 (Filtered)", "V"), Ok(1.0));
         assert!(per_denominator("CH2 (mrad)", "rad").is_ok_and(|per| (per - 1e3).abs() < 1e-9));
         assert_eq!(per_denominator("CH2 (V)", "count"), Err("v".to_owned()));
+        for (header, denominator) in [("enc_counts", "count"), ("Encoder (ticks)", "tick"), ("enc_count", "counts")] {
+            assert_eq!(per_denominator(header, denominator), Ok(1.0), "{header}");
+        }
+        assert_eq!(per_denominator("enc_counts", "tick"), Err("counts".to_owned()));
+        assert!(are_alike("Time (s)", "time_s") && are_alike("U 1", "u1"));
+        for other in ["time_ms", "drive_V", "U"] {
+            assert!(!are_alike("Time (s)", other) && !are_alike("y", other), "{other}");
+        }
         assert_eq!(per_denominator("V_in", "V"), Ok(1.0));
         for (header, expected) in [
             ("Field (Oe)", true),
@@ -412,6 +444,13 @@ mod tests {
             ("Voltage (Filtered)", false),
             ("Voltage_0", false),
             ("CH (1)", false),
+            ("Position (act)", false),
+            ("Position [raw]", false),
+            ("Position (Ist)", false),
+            ("Gauge (CH1)", false),
+            ("Gauge (AI0)", false),
+            ("Gauge (ch)", true),
+            ("Area (mm2)", true),
         ] {
             assert_eq!(has_unknown_unit(header), expected, "{header}");
         }

@@ -77,12 +77,30 @@ pub(super) fn clock(text: &str) -> Option<Clock> {
 
 /// Number of the day `2024-03-05` or `5.3.2024`; none for `3/5/2024`, in which day and month may have either order.
 fn day(date: &str) -> Option<i32> {
+    match parts(date)? {
+        [year @ 1000..10_000, month, day] => number_of([year, month, day]),
+        [day, month, year @ 1000..10_000] if !date.contains('/') => number_of([year, month, day]),
+        _ => None,
+    }
+}
+
+/// Whether a date is the day after another in one of the formats of its parts.
+fn is_next_day(date: &str, before: &str) -> bool {
+    let (Some(date), Some(before)) = (parts(date), parts(before)) else { return false };
+    [[0, 1, 2], [2, 1, 0], [2, 0, 1]].iter().any(|order| {
+        let [date, before] = [date, before].map(|parts| number_of(order.map(|at| parts[at])));
+        date.zip(before).is_some_and(|(date, before)| date == before + 1)
+    })
+}
+
+fn parts(date: &str) -> Option<[i32; 3]> {
     let parts: Option<Vec<i32>> = date.split(['-', '/', '.']).map(|part| part.trim().parse().ok()).collect();
-    let (year, month, day) = match parts?[..] {
-        [year @ 1000..10_000, month @ 1..13, day @ 1..32] => (year, month, day),
-        [day @ 1..32, month @ 1..13, year @ 1000..10_000] if !date.contains('/') => (year, month, day),
-        _ => return None,
-    };
+    parts?.try_into().ok()
+}
+
+/// Number of a day of a year and a month.
+fn number_of(date: [i32; 3]) -> Option<i32> {
+    let [year @ 0..10_000, month @ 1..13, day @ 1..32] = date else { return None };
     // Years that begin in March end with the leap day.
     let (year, month) = if month > 2 { (year, month - 3) } else { (year - 1, month + 9) };
     Some(365 * year + year / 4 - year / 100 + year / 400 + (153 * month + 2) / 5 + day)
@@ -102,13 +120,15 @@ impl SinceFirst {
     }
 
     /// Seconds from the first time to this one. Without a day, a time that falls by half a day is behind midnight. None if
-    /// the zone changes, or a date that does not say its day does so at another time than midnight.
+    /// the zone changes, or a date that does not say its day does so, but not to the next day at midnight.
     pub(super) fn seconds(&mut self, clock: Clock) -> Option<f64> {
-        let is_behind_midnight = clock.seconds < self.last.seconds - 0.5 * DAY;
+        let [has_other_date, has_other_zone] = [0, 1].map(|k| clock.date[k] != self.last.date[k]);
+        let falls = clock.seconds < self.last.seconds - 0.5 * DAY;
+        let is_behind_midnight = falls && (clock.date[0].is_empty() || has_other_date);
         self.midnights += f64::from(u8::from(is_behind_midnight));
         let days = clock.day.zip(self.first.day).map(|(day, first)| f64::from(day - first));
-        let [has_other_date, has_other_zone] = [0, 1].map(|k| clock.date[k] != self.last.date[k]);
-        let is_unknown = has_other_zone || days.is_none() && has_other_date && !is_behind_midnight;
+        let is_next = || is_behind_midnight && is_next_day(&clock.date[0], &self.last.date[0]);
+        let is_unknown = has_other_zone || days.is_none() && has_other_date && !is_next();
         let seconds = days.unwrap_or(self.midnights) * DAY + (clock.seconds - self.first.seconds);
         self.last = clock;
         (!is_unknown).then_some(seconds)
@@ -158,6 +178,11 @@ mod tests {
             ("23:59:59", "00:00:01", Some(2.0)),
             ("2024-03-04 10:00:00", "2024-03-07 09:00:00", Some(2.5e5 + 5600.0)),
             ("3/4/2024 23:59:59", "3/5/2024 0:00:01", Some(2.0)),
+            ("31/12/2024 23:59:59", "1/1/2025 0:00:01", Some(2.0)),
+            ("04.03.24 23:59:59", "05.03.24 0:00:01", Some(2.0)),
+            ("3/4/2024 23:59:59", "3/7/2024 0:00:01", None),
+            ("4-Mar-2024 23:59:59", "7-Mar-2024 0:00:01", None),
+            ("3/4/2024 23:59:59", "3/4/2024 0:00:01", Some(2.0 - DAY)),
             ("3/4/2024 10:00:00", "3/4/2024 10:00:02", Some(2.0)),
             ("3/4/2024 10:00:00", "3/5/2024 10:00:02", None),
             ("4-Mar-2024 10:00:00", "5-Mar-2024 10:00:02", None),

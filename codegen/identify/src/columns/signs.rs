@@ -1,6 +1,6 @@
 //! The decimal sign of a file, which may divide thousands instead.
 
-use super::number::number;
+use super::number::{clock, number};
 use specgen_language::quantity::may_divide_thousands;
 
 /// The signs of the numbers so far.
@@ -11,12 +11,16 @@ pub(super) struct Signs {
     sign: Option<char>,
     /// Whether a number shows that it is the decimal sign, as `0,5` and `1,25` do.
     is_decimal: bool,
-    columns: Vec<Seen>,
+    /// Whether a number of four digits or more shows that nothing divides thousands.
+    is_undivided: bool,
+    /// Whether a time of day has decimals behind a comma.
+    has_comma_clock: bool,
+    columns: Vec<ColumnSigns>,
 }
 
 /// What the numbers of a column show.
 #[derive(Debug, Clone, Default)]
-struct Seen {
+struct ColumnSigns {
     /// Line and text of the first one such as `21,484`.
     doubtful: Option<(usize, String)>,
     /// Whether one has no sign.
@@ -25,7 +29,8 @@ struct Seen {
 
 impl Signs {
     pub(super) fn new(separator: u8, columns: usize) -> Self {
-        Self { separator, sign: None, is_decimal: false, columns: vec![Seen::default(); columns] }
+        let columns = vec![ColumnSigns::default(); columns];
+        Self { separator, sign: None, is_decimal: false, is_undivided: false, has_comma_clock: false, columns }
     }
 
     /// Adds a number of a column; returns whether its sign is that of the numbers before it.
@@ -47,21 +52,59 @@ impl Signs {
 
     /// Looks at every field of a row, those of other columns as well, while there is a doubt.
     pub(super) fn look_at(&mut self, fields: &[&[u8]]) {
-        let Some(sign) = self.sign.filter(|_| !self.is_decimal) else { return };
-        let is_decimal = |text: &str| {
-            number(text, self.separator).is_some_and(|(_, own)| own == Some(sign)) && !may_divide_thousands(text, sign)
-        };
-        self.is_decimal = fields.iter().any(|field| std::str::from_utf8(field).is_ok_and(is_decimal));
+        if self.is_decimal || self.is_undivided {
+            return;
+        }
+        for text in fields.iter().filter_map(|field| std::str::from_utf8(field).ok()) {
+            let digits = text.trim_start_matches(['+', '-']);
+            self.is_undivided |= digits.len() > 3 && digits.bytes().all(|byte| byte.is_ascii_digit());
+            self.has_comma_clock |= text.contains(',') && clock(text).is_some();
+            self.is_decimal |= self.sign.is_some_and(|sign| {
+                number(text, self.separator).is_some_and(|(_, own)| own == Some(sign))
+                    && !may_divide_thousands(text, sign)
+            });
+        }
     }
 
     /// Column, line and text of a number whose sign may divide thousands. A point does so where semicolons separate the
-    /// columns, and then not in the numbers below 1000.
+    /// columns. There the numbers below 1000 have no sign.
     pub(super) fn doubt(&self) -> Option<(usize, usize, &str)> {
-        let is_point = self.sign.filter(|_| !self.is_decimal)? == '.';
-        if is_point && self.separator != b';' {
+        let is_point = self.sign.filter(|_| !self.is_decimal && !self.is_undivided)? == '.';
+        let has_semicolons = self.separator == b';';
+        if is_point && !has_semicolons || !is_point && self.has_comma_clock {
             return None;
         }
-        let mut columns = self.columns.iter().enumerate().filter(|(_, seen)| !is_point || seen.has_whole);
+        let mut columns = self.columns.iter().enumerate().filter(|(_, seen)| !has_semicolons || seen.has_whole);
         columns.find_map(|(at, seen)| seen.doubtful.as_ref().map(|(line, text)| (at, *line, text.as_str())))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_sign_divides_thousands_unless_a_field_shows_that_it_does_not() {
+        for (separator, rows, doubt) in [
+            (b';', &["10:00:00,100;5,000", "10:00:00,200;20,000"][..], None),
+            (b';', &["0;5,000", "1;20,000"], None),
+            (b';', &["0;999", "1;20,000"], Some("20,000")),
+            (b';', &["10:00:00,100;999", "10:00:00,200;20,000"], None),
+            (b';', &["10:00:00,100;999", "10:00:00,200;20.000"], Some("20.000")),
+            (b'\t', &["0\t5,000", "1\t20,000"], Some("5,000")),
+            (b'\t', &["1000\t7", "1001\t20,000"], None),
+            (b'\t', &["-1000\t7", "1\t20,000"], None),
+            (b'\t', &["0,5\t7", "1\t20,000"], Some("20,000")),
+            (b'\t', &["0\t20,000", "0,5\t7"], None),
+        ] {
+            let mut signs = Signs::new(separator, 1);
+            for (line, row) in rows.iter().enumerate() {
+                let fields: Vec<&str> = row.split(char::from(separator)).collect();
+                let (_, sign) = number(fields[1], separator).unwrap();
+                assert!(signs.add(0, line, fields[1], sign), "{row}");
+                signs.look_at(&fields.iter().map(|field| field.as_bytes()).collect::<Vec<_>>());
+            }
+            assert_eq!(signs.doubt().map(|(_, _, text)| text), doubt, "{rows:?}");
+        }
     }
 }

@@ -97,7 +97,10 @@ fn numbers(data: &Dataset, left: &mut Left) -> Option<(Vec<usize>, Vec<f64>)> {
     let attributes = data.attrs().ok()?;
     let class = attributes.get("MATLAB_class").and_then(AttrValue::as_str);
     // Of packed numbers the scale is an attribute.
-    let is_packed = ["scale_factor", "add_offset"].iter().any(|name| attributes.contains_key(*name));
+    let is_packed = [("scale_factor", 1.0), ("add_offset", 0.0)].iter().any(|(name, neutral)| {
+        let value = |value: &AttrValue| value.as_f64().or_else(|| value.as_i64().map(|value| value as f64));
+        attributes.get(*name).is_some_and(|given| value(given) != Some(*neutral))
+    });
     if is_packed || class.is_some_and(|class| NO_NUMBERS.contains(&class)) {
         return None;
     }
@@ -146,13 +149,17 @@ mod tests {
         counts.set_attr("units", AttrValue::AsciiString("counts".into()));
         let packed = outer.create_dataset("packed").with_i32_data(&[7]);
         packed.set_attr("scale_factor", AttrValue::F64(0.5));
+        let neutral = outer.create_dataset("neutral").with_i32_data(&[7]);
+        neutral.set_attr("scale_factor", AttrValue::F64(1.0));
+        neutral.set_attr("add_offset", AttrValue::I32(0));
         let time = outer.create_dataset("time_s").with_i32_data(&[7]);
         time.set_attr("units", AttrValue::AsciiString("sec".into()));
         outer.create_dataset("matrix").with_f64_data(&[1.0, 2.0, 3.0, 4.0, 5.0, 6.0]).with_shape(&[3, 2]);
         builder.add_group(outer.finish());
         let found = contents(builder.finish().unwrap(), u64::MAX).unwrap();
         let arrays: Vec<_> = found.arrays.iter().map(|a| (a.group.as_str(), a.name.as_str(), &a.size[..])).collect();
-        let units = ["count [mV]", "drive_V [mV]", "force_N [counts]", "time_s"].map(|name| ("scan", name, &[1][..]));
+        let units = ["count [mV]", "drive_V [mV]", "force_N [counts]", "neutral", "time_s"]
+            .map(|name| ("scan", name, &[1][..]));
         assert_eq!(arrays, [&units[..], &[("scan", "matrix", &[2, 3])]].concat());
         let reason = "no array of numbers that can be read, or one with a scale".to_owned();
         assert_eq!(found.others, [("operator".to_owned(), reason.clone()), ("packed".to_owned(), reason)]);

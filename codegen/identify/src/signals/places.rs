@@ -285,16 +285,18 @@ impl Search<'_> {
     }
 
     /// The entry of `--columns` for a quantity in a column, with the unit of the column. If that is of another quantity,
-    /// or not known, it gets a factor of 1.
+    /// or not known, it gets a factor of 1; a header such as `-displacement (um)`, one of -1.
     fn entry(&self, name: &'static str, at: usize) -> String {
         let header = self.header.names.get(at).map_or("", String::as_str);
         let Some(quantity) = names::quantity(name) else { return String::new() };
         let (plain, word) = (quantity.plain(), self.word(at));
+        let one = if header.starts_with(names::MINUS) { "-1" } else { "1" };
         match names::own_unit(header) {
+            Some(unit) if quantity.per(unit).is_some() && one == "-1" => format!("{plain}={word}*-1 {unit}"),
             Some(unit) if quantity.per(unit).is_some() => format!("{plain}_{unit}={word}"),
-            Some(unit) => format!("{plain}={word}*1 {}/{unit}", quantity.unit()),
-            None if has_other_unit(header, quantity) || names::has_unknown_unit(header) => {
-                format!("{plain}={word}*1 {}", quantity.unit())
+            Some(unit) => format!("{plain}={word}*{one} {}/{unit}", quantity.unit()),
+            None if one == "-1" || has_other_unit(header, quantity) || names::has_unknown_unit(header) => {
+                format!("{plain}={word}*{one} {}", quantity.unit())
             }
             None => format!("{name}={word}"),
         }
@@ -323,7 +325,7 @@ impl Search<'_> {
         };
         let headers = self.header.names.iter().enumerate();
         headers
-            .filter(|(_, header)| !header.is_empty() && !taken(header))
+            .filter(|(_, header)| !header.is_empty() && !header.starts_with(names::MINUS) && !taken(header))
             .map(|(at, header)| (strsim::damerau_levenshtein(&header.to_ascii_lowercase(), &lower), at, header))
             .filter(|(distance, _, header)| *distance < NEAR || header.to_ascii_lowercase().starts_with(plain))
             .min()
@@ -408,6 +410,7 @@ mod tests {
             ("a,b\n1,2\n", "`--columns drive_V=a,displacement_um=b --rate HZ`"),
             ("sample,a,b\n0,1,2\n", "`--columns drive_V=a,displacement_um=b --rate HZ`"),
             ("time_s,drive_V,displacement_ft\n0,1,2\n", "`--columns 'displacement=displacement_ft*1 um'`"),
+            ("time_s,drive_V,-Displacement (nm)\n0,1,2\n", "`--columns 'displacement=-Displacement (nm)*-1 nm'`"),
         ] {
             let all = found(text, &Reading::default()).unwrap_err();
             assert!(all.iter().all(|one| one.contains(options)), "{text}: {all:?}");

@@ -406,7 +406,7 @@ impl<P: Port> Operator<P> {
     pub(super) fn wait(&mut self, until: WaitCondition, limit: Duration, ui: &Ui) -> Result<(), SessionError> {
         let start = Instant::now();
         // Waiting for another phase means that a stop is expected.
-        self.is_stopping |= matches!(until, WaitCondition::Phase(phase) if phase != Phase::Running);
+        self.is_stopping |= matches!(until, WaitCondition::Phase(phase) if !phase.is_commanded());
         self.was_stopped = false;
         loop {
             if until == WaitCondition::Arrived && self.was_stopped {
@@ -431,6 +431,8 @@ impl<P: Port> Operator<P> {
                 WaitCondition::Passed(time) => start.elapsed() >= time,
             };
             if there {
+                // The next stop is another one.
+                self.is_stopping &= !matches!(until, WaitCondition::Phase(_));
                 return Ok(());
             }
             let expected = match until {

@@ -235,11 +235,11 @@ impl<P: Port> Operator<P> {
         Ok(())
     }
 
-    /// Writes rows of `every` ticks, or of the fewest that the line carries, to a CSV file for a lead and a duration, s; `start` is
-    /// called after the lead. A file without a gap, or none.
+    /// Writes rows of `every` ticks, or of the fewest that the line carries, up to `most`, to a CSV file for a lead and a duration, s;
+    /// `start` is called after the lead. A file without a gap, or none.
     pub(crate) fn record_rows(
         &mut self,
-        every: u32,
+        (every, most): (u32, u32),
         [lead, seconds]: [f64; 2],
         path: &Path,
         start: &mut Start<'_, P>,
@@ -248,9 +248,14 @@ impl<P: Port> Operator<P> {
         let mut sink = Sink::new(Some(path), ui)?;
         let every = match self.session.stream(every) {
             Ok(()) => every,
-            Err(ClientError::Refused(Refusal::Rate { least })) => {
+            Err(ClientError::Refused(Refusal::Rate { least })) if least <= most => {
                 self.session.stream(least)?;
                 least
+            }
+            Err(ClientError::Refused(Refusal::Rate { least })) => {
+                return Err(SessionError::Refused(format!(
+                    "the line carries rows of {least} ticks at least, {every} are planned: use a faster line"
+                )));
             }
             Err(other) => return Err(other.into()),
         };

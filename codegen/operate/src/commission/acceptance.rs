@@ -48,6 +48,11 @@ fn size(compiled: &Compilation) -> f64 {
     bounds[..3].iter().fold(SIZE, |size, bound| if SHARE * bound < size { SHARE * bound } else { size })
 }
 
+/// Name of its record: a trajectory may be called `hold`.
+fn of_trajectory(name: &str) -> String {
+    format!("trajectory-{name}")
+}
+
 /// Records all motions of a disarmed machine into the folder.
 pub(super) fn measure(
     machine: &mut Machine,
@@ -63,19 +68,19 @@ pub(super) fn measure(
     request(machine, Request::Run, Phase::Running, ui)?;
     machine.execute(&arrived, ui)?;
     rest(machine, 2.0 * MARGIN, ui)?;
-    machine.record_rows(slow, [0.0, HOLD], &path("hold"), &mut |_| Ok(()), ui)?;
+    machine.record_rows((slow, u32::MAX), [0.0, HOLD], &path("hold"), &mut |_| Ok(()), ui)?;
 
     let (home, size) = (machine.place()?.target, size(compiled));
     let mut up = home;
     up[2] += size;
-    machine.record_rows(fast, [MARGIN, STEP], &path("step"), &mut |machine| machine.go(up), ui)?;
+    machine.record_rows((fast, u32::MAX), [MARGIN, STEP], &path("step"), &mut |machine| machine.go(up), ui)?;
     machine.execute(&arrived, ui)?;
     machine.go(home)?;
     machine.execute(&arrived, ui)?;
 
     let wave = machine.wave_of_text(&circle(&home, size)).map_err(SessionError::Refused)?;
     let mut turn = |machine: &mut Machine| machine.start_wave("circle", &wave, false);
-    machine.record_rows(fast, [MARGIN, CIRCLE[0]], &path("circle"), &mut turn, ui)?;
+    machine.record_rows((fast, u32::MAX), [MARGIN, CIRCLE[0]], &path("circle"), &mut turn, ui)?;
     rest(machine, MARGIN, ui)?;
 
     for (name, start, seconds) in trajectories(compiled) {
@@ -83,7 +88,13 @@ pub(super) fn measure(
         machine.execute(&arrived, ui)?;
         let play = Command::Play { name: name.to_owned(), correction: None };
         let seconds = if seconds < LONGEST { seconds } else { LONGEST };
-        machine.record_rows(fast, [MARGIN, seconds], &path(name), &mut |machine| machine.execute(&play, ui), ui)?;
+        machine.record_rows(
+            (fast, u32::MAX),
+            [MARGIN, seconds],
+            &path(&of_trajectory(name)),
+            &mut |machine| machine.execute(&play, ui),
+            ui,
+        )?;
         machine.execute(&Command::Set(vec![("command".to_owned(), "hold".to_owned())]), ui)?;
         machine.execute(&arrived, ui)?;
     }
@@ -129,7 +140,8 @@ pub(super) fn figures(folder: &Path, compiled: &Compilation) -> Result<Vec<Figur
     let turns = read("circle")?.errors([MARGIN + ramp, MARGIN + seconds - ramp])?;
     figures.push(bare(format!("circle of {size:.3} um at {TURNS} Hz, rms of x y z"), norm(&turns[..3])));
     for (name, _, seconds) in trajectories(compiled) {
-        let errors = read(name)?.errors([MARGIN, MARGIN + if seconds < LONGEST { seconds } else { LONGEST }])?;
+        let errors =
+            read(&of_trajectory(name))?.errors([MARGIN, MARGIN + if seconds < LONGEST { seconds } else { LONGEST }])?;
         for (what, axis, key) in [("x y z", 0, "translation"), ("rx ry rz", 3, "rotation")] {
             let limits = compiled.model.requirements.tracking.iter();
             let own = limits.filter(|limit| limit.trajectory.as_deref().is_none_or(|own| own == name));

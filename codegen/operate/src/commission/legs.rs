@@ -1,11 +1,12 @@
 //! Cross-talk and models of the legs, from their records in the folder.
 
 use std::path::Path;
+use std::slice::from_ref;
 
 use specgen_compiler::compile::Compilation;
 use specgen_identify::assembled::{Drive, Kind, Plan};
 use specgen_identify::cross_talk::of_records;
-use specgen_identify::leg_model::{Choice, LegModel, Selection, choose};
+use specgen_identify::leg_model::{Choice, LegModel, Selection, choose, strokes};
 use specgen_identify::rate::RateModel;
 use specgen_identify::{DeadTime, Options, Record, error_on, join, predict, write_leg_csv};
 use specgen_language::diagnostic::{Diagnostic, codes};
@@ -60,7 +61,7 @@ pub(super) fn identify(
             work.into_iter().map(std::thread::ScopedJoinHandle::join).collect::<Vec<_>>()
         })
     });
-    let mut legs = Vec::new();
+    let (mut legs, mut tables) = (Vec::new(), Vec::new());
     for (number, (found, set)) in done.into_iter().zip(&sets).enumerate() {
         // The panic hook has reported where.
         let found = found.map_err(|_| Failure::Environment(format!("the identification of leg {number} crashed")))?;
@@ -69,11 +70,9 @@ pub(super) fn identify(
         // So it is planned for the fast curves.
         warnings.retain(|one| one.code != codes::SWEEP_TOO_FAST);
         ui.findings(None, &warnings);
-        let path = record(folder, &format!("leg{number}"));
-        // A spec that was commissioned before names it.
-        edit_file(&path, write_leg_csv(&model).as_bytes())?;
+        tables.push(write_leg_csv(&model));
         let [low, high] = compiled.model.actuator.voltage;
-        let stroke = specgen_identify::leg_model::strokes(&[model.table.clone()], &[model.around.clone()]);
+        let stroke = strokes(from_ref(&model.table), from_ref(&model.around));
         let held_out = scores.iter().find(|score| score.family == family).map(|score| score.held_out_rms);
         let predicted = set.arbitrary.as_ref().map(|record| error_of(&model, record));
         legs.push(Leg {
@@ -83,6 +82,10 @@ pub(super) fn identify(
             arbitrary_rms: predicted.transpose().map_err(refused)?,
             record: records(plan, number).next().map(|drive| format!("{}.csv", drive.name)).unwrap_or_default(),
         });
+    }
+    for (number, table) in tables.iter().enumerate() {
+        // A spec that was commissioned before names it.
+        edit_file(&record(folder, &format!("leg{number}")), table.as_bytes())?;
     }
     Ok(legs)
 }

@@ -42,14 +42,23 @@ pub(super) fn with<T>(
     let mut machine = Operator::new(session, stop);
     machine.alike = compiled.ir.supervision.alike().to_vec();
     machine.model = Some(compiled.model.clone());
-    let done = begins(&machine).and_then(|()| work(&mut machine));
+    if let Err(SessionError::Refused(text)) = begins(&machine) {
+        // Another host may operate it.
+        return Err(Failure::Gate(format!("{name}: {text}")));
+    }
+    let done = work(&mut machine);
+    // The last status may be older than the last request.
+    let down = match machine.in_control || machine.is_powered() {
+        true => machine.ramp_down(ui),
+        false => Ok(format!("the machine is {}, amplifiers off", machine.state())),
+    };
     if let Err(SessionError::Link(error)) = &done {
         return Err(lost_link(&name, error));
     }
-    let down = match machine.is_powered() {
-        true => machine.ramp_down(ui).map_err(|error| lost_link(&name, &error))?,
-        false => format!("the machine is {}, amplifiers off", machine.state()),
-    };
+    let down = down.map_err(|error| lost_link(&name, &error))?;
+    if done.is_ok() && begins(&machine).is_err() {
+        return Err(Failure::Gate(format!("{name}: {down}")));
+    }
     done.map_err(|error| match error {
         SessionError::Interrupted => Failure::Interrupted {
             message: format!("interrupted; {down}; the same command continues"),
@@ -117,5 +126,6 @@ pub(super) fn play(machine: &mut Machine, drive: &Drive, path: &Path, ui: &Ui) -
         start(machine)?;
         return rest(machine, drive.seconds() + ENDED, ui);
     }
-    machine.record_rows(drive.average, [MARGIN, drive.seconds() + MARGIN], path, &mut start, ui)
+    let spans = [MARGIN, drive.seconds() + MARGIN];
+    machine.record_rows((drive.average, drive.average), spans, path, &mut start, ui)
 }

@@ -88,7 +88,7 @@ fn legs(state: &State, text: &mut String) {
         let arbitrary = leg.arbitrary_rms.map_or_else(|| "-".to_owned(), |rms| nano(0, rms));
         row(text, &columns, &[&number, &gain, &change, &nano(0, leg.fit_rms), &arbitrary, &leg.model]);
     }
-    *text += "```\n\nRms errors of the displacement: of the curves (held out if a model was chosen), and of the arbitrary record, which no fit used.\n";
+    *text += "```\n\nRms errors of the displacement: of the curves (held out if a model was chosen), and of the arbitrary record, by which the model was chosen.\n";
 }
 
 fn acceptance(state: &State, text: &mut String) {

@@ -10,7 +10,7 @@ pub(super) const MARGIN: f64 = 1.0;
 /// Time beside the drives, s: arming, noise, ramp-down, acceptance with trajectories of some seconds.
 const BESIDE: f64 = 90.0;
 /// Part of the voltage that curves may leave out.
-const SHORT: f64 = 1e-3;
+const SHORT: f64 = 1e-2;
 
 /// The drives of a platform, for reversal curves of `grid` levels and this frequency of the mains, Hz.
 ///
@@ -63,7 +63,7 @@ fn bench(compiled: &Compilation, mains: f64) -> Option<Bench> {
     })
 }
 
-/// A code is beside the limit that it stands for.
+/// A limit in place of the voltage of a code beside it.
 fn within(volts: f64, [low, high]: [f64; 2]) -> f64 {
     let near = 1e-3 * (high - low);
     match volts {

@@ -38,7 +38,9 @@ fn with(text: &str, state: &State, folder: &str, (stacks, grid): (u32, usize)) -
     if !state.legs.is_empty() {
         let hysteresis = section(&mut document, "hysteresis")?;
         let files: Array = (0..state.legs.len()).map(|leg| format!("{folder}leg{leg}.csv")).collect();
-        RATE.iter().for_each(|key| drop(hysteresis.remove(key)));
+        if state.legs.iter().any(|leg| leg.model != "preisach") {
+            RATE.iter().for_each(|key| drop(hysteresis.remove(key)));
+        }
         hysteresis.entry("grid").or_insert(toml_edit::value(grid as i64));
         let models: Vec<&str> = state.legs.iter().map(|leg| leg.model.as_str()).collect();
         let (first, models) = (&state.legs[0].record, listed(&models));

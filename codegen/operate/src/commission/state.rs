@@ -206,6 +206,10 @@ impl State {
         if step != Step::Wiring && step != Step::Acceptance {
             self.steps.retain(|later, passed| *later < step || passed.skipped.is_some());
         }
+        // Figures of another controller.
+        if !self.is_over(Step::Acceptance) {
+            self.acceptance.clear();
+        }
     }
 }
 

@@ -3,9 +3,7 @@
 use crate::common::worse;
 use specgen_runtime::Motion;
 use specgen_runtime::setpoint::{MoveLimits, Parallel, Setpoints, StopLimits};
-use specgen_runtime::wave::{
-    AxisWave, LARGEST, Limits, Refusal, Settings, Shape, Stage, TONES, Tone, WORDS, Wave, step_of,
-};
+use specgen_runtime::wave::{AxisWave, Limits, Refusal, Settings, Shape, Stage, TONES, Tone, WORDS, Wave, step_of};
 
 const PERIOD: f64 = 1e-4;
 
@@ -375,7 +373,7 @@ fn every_word_of_a_shape_has_its_bounds() {
     }
     let mut words = Settings::<f64>::still().to_words();
     for (place, bad) in [
-        (0, number(2.0 * LARGEST)),
+        (0, number(17e3)),
         (6 + 6 * AXIS, number(-1e-9)),
         (6 + 6 * AXIS + 2, half + 1),
         (WORDS - 2, 0),

@@ -3,14 +3,13 @@
 mod refusal;
 
 use serde::Serialize;
-use specgen_numerics::displacements;
+use specgen_numerics::{coupled, displacements};
 use specgen_runtime::Platform;
 use specgen_runtime::setpoint::StopLimits;
 
 use super::poses::{Stretch, along};
 use super::{AXES, User, amount, stop};
 use crate::ir::Setpoints;
-use crate::reach::coupled;
 use specgen_language::diagnostic::Diagnostic;
 use specgen_language::model::{Model, TaskSpace};
 use specgen_numerics::largest;

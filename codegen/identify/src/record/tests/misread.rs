@@ -35,7 +35,8 @@ fn what_could_be_read_as_something_else_is_read_right_or_refused() {
             format!("{} 10:00:00.{:03.0},{u},{y}", if t < 0.1 { "3/4/2024" } else { later }, 1e3 * t)
         })
     };
-    let right: [(&str, String, &[&str]); 8] = [
+    let again = |comment: &str| replaced(120, &format!("{comment}\n{}", plain(NAMES).lines().nth(119).unwrap()));
+    let right: [(&str, String, &[&str]); 14] = [
         ("minus signs of typesetting", plain(NAMES).replace('-', "\u{2212}"), &[]),
         ("three decimals behind commas", small(small_names, |value| format!("{value:.3}").replace('.', ",")), &[]),
         ("whole numbers, some with a comma", small(small_names, |value| format!("{value}").replace('.', ",")), &[]),
@@ -54,6 +55,24 @@ fn what_could_be_read_as_something_else_is_read_right_or_refused() {
             file("time_s,u,U", |[t, u, y]| format!("{t},{y},{u}")),
             &["drive_V=U,displacement_um=u"],
         ),
+        ("the same comment in other words", again("# Time (s), Drive (V), Displacement (um)"), &[]),
+        ("the same comment with a comma behind it", again("# time_s,drive_V,displacement_um,"), &[]),
+        (
+            "names in a comment between the rows of a file without names",
+            again(&format!("# {NAMES}")).replacen(&format!("{NAMES}\n"), "", 1),
+            &["time_s=1,drive_V=2,displacement_um=3"],
+        ),
+        (
+            "dates with noughts, and no names",
+            file("", |[t, u, y]| format!("{:.0},05/03/2024,{:.0},{:.0}", 1e3 * t, 10.0 * u, 1e4 * y)),
+            &["time_ms=1,drive=3*0.1 V,displacement=4*1e-4 um"],
+        ),
+        (
+            "a factor per count",
+            file("time_s,drive_V,enc_counts", |[t, u, y]| format!("{t},{u},{:?}", 1e3 * y)),
+            &["displacement=enc_counts*0.001 um/count"],
+        ),
+        ("a remark in brackets", plain("time_s,drive_V,Position (act)"), &["displacement_um=Position (act)"]),
         ("dates on one day", dated("3/4/2024"), &[]),
         (
             "a name of this project beside another",
@@ -140,7 +159,12 @@ fn what_could_be_read_as_something_else_is_read_right_or_refused() {
             None,
             ["E0504", "its unit is v", "per unit"],
         ),
-        (&plain("time_s,drive_V,-displacement_um"), &[], None, ["E0504", "is missing", "displacement_um"]),
+        (
+            &plain("time_s,drive_V,-displacement_um"),
+            &[],
+            None,
+            ["E0504", "is missing", "'displacement=-displacement_um*-1 um'"],
+        ),
         (&replaced(120, "0.118,9.91E+37,0.5"), &[], None, ["E0508", "`9.91E+37`", "delete the sample"]),
         (&replaced(120, "0.118,9.9e37,0.5"), &[], None, ["E0508", "`9.9e37`", "delete the sample"]),
         (
@@ -159,5 +183,7 @@ fn what_could_be_read_as_something_else_is_read_right_or_refused() {
     }
     // With what the help says, they are read.
     assert_same("one of two", read(two.as_bytes(), &["displacement_nm=displacement_nm"], None));
+    let minus = file("time_s,drive_V,-displacement_um", |[t, u, y]| format!("{t:?},{u:?},{:?}", -y));
+    assert_same("the other sign", read(minus.as_bytes(), &["displacement=-displacement_um*-1 um"], None));
     assert_same("a unit", read(plain("time_s,drive_V,Field (Oe)").as_bytes(), &["displacement=Field (Oe)*1 um"], None));
 }
