@@ -241,6 +241,20 @@ fn the_reference_platform_is_planned_as_the_study_says() {
     assert!(!small.notes.is_empty());
 }
 
+/// A record is found by its name.
+#[test]
+fn no_two_records_have_one_name() {
+    for grid in 4..=64 {
+        let found = plan(&reference(), grid, false).unwrap();
+        let recorded = found.drives.iter().filter(|drive| drive.kind != Kind::Preconditioning);
+        let mut names: Vec<&str> = recorded.map(|drive| drive.name.as_str()).collect();
+        let all = names.len();
+        names.sort_unstable();
+        names.dedup();
+        assert_eq!(names.len(), all, "{grid}");
+    }
+}
+
 #[test]
 fn what_cannot_be_planned_is_said() {
     let refused = |bench: Bench, grid: usize| plan(&bench, grid, true).unwrap_err();
