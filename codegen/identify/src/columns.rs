@@ -341,7 +341,7 @@ impl Lines<'_> {
         Samples { lines, columns, simulated: self.simulated }
     }
 
-    /// How to mend a row whose fields are not those of the columns.
+    /// Help for a row whose fields do not match the columns.
     fn misaligned(&self, fields: &[&[u8]]) -> Option<&'static str> {
         // Without names, a shorter row is one of another kind, whatever separates its fields.
         let separator = if self.names.is_empty() { head::BLANK } else { self.separator };

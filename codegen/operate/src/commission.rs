@@ -211,7 +211,7 @@ impl Work<'_> {
         plan::of(self.compiled, state.grid, state.mains)
     }
 
-    /// Shows what the machine will do, and for how long. Whether it may: it is not asked for, or the user agrees.
+    /// Shows what the machine will do and for how long. Returns whether it may begin: the user agrees, or need not be asked.
     fn permitted(&self, steps: &[Step], state: &State) -> Result<bool, Failure> {
         let plan = self.plan(state)?;
         let report = PlanReport::new(steps, &plan, state, self.options);

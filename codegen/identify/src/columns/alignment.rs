@@ -59,7 +59,7 @@ fn filled(fields: &[&[u8]]) -> usize {
     fields.iter().rposition(|field| !field.is_empty()).map_or(0, |last| last + 1)
 }
 
-/// How to mend a row whose fields are not those of `count` columns. A text behind them is a remark.
+/// Help for a row whose fields do not match `count` columns. A text behind them is a remark.
 pub(super) fn misaligned(fields: &[&[u8]], count: usize, separator: u8) -> Option<&'static str> {
     let is_number = |field: &&[u8]| number(&decoded(field), separator).is_some();
     if fields.iter().skip(count).any(is_number) {

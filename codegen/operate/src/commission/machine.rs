@@ -42,9 +42,12 @@ pub(super) fn with<T>(
     let mut machine = Operator::new(session, stop);
     machine.alike = compiled.ir.supervision.alike().to_vec();
     machine.model = Some(compiled.model.clone());
-    if let Err(SessionError::Refused(text)) = begins(&machine) {
+    if !is_disarmed(&machine) {
         // Another host may operate it.
-        return Err(Failure::Gate(format!("{name}: {text}")));
+        return Err(Failure::Gate(format!(
+            "{name}: the machine is {}; a step begins with a disarmed machine: `ramp-down`, or `acknowledge`, in `specgen operate`",
+            machine.state()
+        )));
     }
     let done = work(&mut machine);
     // The last status may be older than the last request.
@@ -56,7 +59,7 @@ pub(super) fn with<T>(
         return Err(lost_link(&name, error));
     }
     let down = down.map_err(|error| lost_link(&name, &error))?;
-    if done.is_ok() && begins(&machine).is_err() {
+    if done.is_ok() && !is_disarmed(&machine) {
         return Err(Failure::Gate(format!("{name}: {down}")));
     }
     done.map_err(|error| match error {
@@ -71,14 +74,8 @@ pub(super) fn with<T>(
     })
 }
 
-fn begins(machine: &Machine) -> Result<(), SessionError> {
-    if u64::from(machine.phase()) == Phase::Disarmed.word() {
-        return Ok(());
-    }
-    let state = machine.state();
-    Err(SessionError::Refused(format!(
-        "the machine is {state}; a step begins with a disarmed machine: `ramp-down`, or `acknowledge`, in `specgen operate`"
-    )))
+fn is_disarmed(machine: &Machine) -> bool {
+    u64::from(machine.phase()) == Phase::Disarmed.word()
 }
 
 /// Arms, with the wiring check; the machine then holds.
