@@ -125,10 +125,11 @@ enum Command {
     Tune(tune::Arguments),
     /// Design active damping that is stable with every structural mode in [robust.structure], and write it into the spec.
     Design(design::Arguments),
-    /// Learn a repeated motion, simulated or (with --port or --socket) on a machine, which is armed first and ramped down
-    /// afterwards: measure passes and compute the correction that cancels their error.
+    /// Iterative learning control: repeat a motion and compute the correction that cancels its error, in simulation or (with
+    /// --port or --socket) on a machine, which is armed first and ramped down afterwards.
     Learn(learn::Arguments),
-    /// Test the closed loop on corners and random draws of the declared uncertainties, for instance as a build gate.
+    /// Simulate machines that differ from the spec within the declared uncertainties: corners and random draws; also as a build
+    /// gate.
     Robust(robust::Arguments),
     /// Write an HTML report about a spec (verdict, tracking, error budget, margins, hysteresis, findings) or about a run.
     Report(report::Arguments),
@@ -136,24 +137,25 @@ enum Command {
     Reproduce(reproduce::Arguments),
     /// Processor in the loop: control a simulated machine with a microcontroller, emulated or at a serial port.
     Pil(pil::Arguments),
-    /// Identify a wired machine with its own converters, write its spec, and verify it: wiring check, cross-talk, reversal curves,
-    /// leg models, acceptance. An interrupted commissioning continues where it stopped.
+    /// Commission a wired machine: check the wiring, measure each leg with the machine's own converters, write the results into
+    /// the spec, and test the machine with its new controller. After an interruption the same command continues.
     Commission(commission::Arguments),
-    /// Operate a machine over the link: arm, run, set-points, settings, waves, records; from a script or line by line.
+    /// Operate a machine at a serial port or socket: arm, run, move, change settings, play waves, record; from a script or line by
+    /// line.
     Operate(operate::Arguments),
     /// Show and operate a machine in the browser: pose, strip charts, spectrum, events. One page is in control at a time.
     Panel(panel::Arguments),
     /// Bridge to the General Command Set (GCS) 2.0 of piezo stages and hexapods: let its clients move a machine.
     Gcs(gcs::Arguments),
-    /// Replay a recording of a target on the host and compare every tick bit for bit; or export it as CSV or MCAP.
+    /// Replay a recorded run on this computer and compare every tick bit for bit; or export it as CSV or MCAP.
     Replay(replay::Arguments),
-    /// Compute M, C ḣ, G, J and leg forces at given states, with the controller's model.
+    /// Compute inertia M, Coriolis terms C ḣ, gravity G, Jacobian J and leg forces at given states, with the controller's model.
     Dynamics(dynamics::Arguments),
     /// Export the controller as a C library, a Python module or an FMU.
     Export(export::Arguments),
     /// Identify an Everett table, or another property such as response or stiffness, from measured records.
     Identify(identify::Arguments),
-    /// Simulate the reversal-curve experiment that `identify` needs, on a leg of a spec or the reference leg.
+    /// Simulate the reversal-curve experiment that `identify` needs, or only write its drive signal for a waveform generator.
     Forc(forc::Arguments),
     /// Serve the simulated machine of a spec to a real-time controller on this computer.
     Plant(plant::Arguments),

@@ -10,13 +10,13 @@ use super::path_roles::{InputFile, OutputFolder};
 /// Arguments of the main job.
 #[derive(Args, Debug)]
 pub struct Arguments {
-    /// The spec file.
+    /// The spec: a TOML file that describes the platform. `specgen new` writes one to start from.
     #[arg(required = true)]
     pub spec: Option<InputFile>,
     /// Output folder; `<name>-controller` if not given. Must be new, empty, or an unchanged earlier output.
     #[arg(short, long, value_name = "DIR")]
     output: Option<OutputFolder>,
-    /// Write the source, and build nothing.
+    /// Only write the source code; build nothing.
     #[arg(long)]
     no_build: bool,
     /// Also write the crates for your own board: `hal`, `board`, `link`. See docs/porting.md.

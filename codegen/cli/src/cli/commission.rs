@@ -16,42 +16,44 @@ use super::path_roles::{InputFile, OutputFolder};
 #[derive(Args, Debug)]
 #[command(after_help = super::examples::COMMISSION)]
 pub struct Arguments {
-    /// The spec that the device was built from: first a draft, after the steps up to `spec` the one that they wrote.
+    /// The spec of the controller that the machine runs: at first your draft, for `acceptance` the one that the step `spec`
+    /// wrote.
     spec: InputFile,
     #[command(flatten)]
     line: Line,
-    /// Folder of records and results. A commissioning that was interrupted continues from it.
+    /// Folder for records and results. An interrupted commissioning continues from it.
     #[arg(short, long, value_name = "DIR", default_value = "commission")]
     output: OutputFolder,
     /// Do only this step: wiring, cross-talk, curves, identify, spec or acceptance. May be repeated.
     #[arg(long, value_name = "STEP", value_parser = Step::parse)]
     step: Vec<Step>,
-    /// Do the steps again, all or those of --step: their records are replaced, and later steps are open again.
+    /// Repeat all steps, or those of --step. Their records are replaced, and later steps that depend on them are to be done
+    /// again.
     #[arg(long)]
     again: bool,
-    /// Skip a step, such as curves="identified before"; the page names the reason.
+    /// Skip a step, such as curves="identified before". The page of results, commission.md, shows the reason.
     #[arg(long, value_name = "STEP=REASON", value_parser = Step::parse_skip)]
     skip: Vec<(Step, String)>,
-    /// Reversal curves of a leg; 32 if not given.
+    /// Number of reversal curves for each leg; 32 if not given.
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u16).range(4..=128))]
     grid: Option<u16>,
     /// Frequency of the mains, Hz; 50 if not given.
     #[arg(long, value_name = "HZ", value_parser = number("Hz", "a frequency from 10 to 100 Hz", 10.0..=100.0), allow_negative_numbers = true)]
     mains: Option<f64>,
-    /// Leg model: preisach, bouc-wen, generalized-plays, plays, bouc-wen-plays; or auto: one of these for each leg, by the
-    /// error on its arbitrary record.
+    /// Leg model: preisach, bouc-wen, generalized-plays, plays, bouc-wen-plays; or auto: for each leg
+    /// the simplest of these whose error on its record of a random motion is within 10 % of the smallest.
     #[arg(long, value_name = "MODEL", value_parser = model, default_value = "auto")]
     model: LegModelKind,
-    /// Name or serial number of the machine, for the page.
+    /// Name or serial number of the machine, for commission.md.
     #[arg(long, value_name = "NAME")]
     machine: Option<String>,
     /// Print what the machine would do and for how long, and send nothing.
     #[arg(long, conflicts_with = "yes")]
     plan: bool,
-    /// Begin without a question.
+    /// Begin without asking.
     #[arg(long)]
     yes: bool,
-    /// Only compute figures and page again from the records.
+    /// Move nothing: compute the figures again from the records, and write commission.md again.
     #[arg(long, conflicts_with_all = ["plan", "yes", "step", "again", "skip"])]
     report: bool,
     /// Edit the spec in place, instead of writing platform.toml into the folder of the records.

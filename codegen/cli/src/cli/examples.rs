@@ -22,8 +22,8 @@ docs/README.md lists the tutorials. Every command has its own examples:
 needs a board, a second program, or an idle computer.
 
 Exit codes: 0 good; 1 spec, record or budget refused, or an unreadable input;
-2 usage, or an output that is an input; 3 environment; 4 a simulated run ended
-before the end of its path; 130 interrupted.";
+2 usage, or an output that is an input; 3 missing tool, full disk and the like;
+4 a simulated run ended before the end of its path; 130 interrupted.";
 
 pub const NEW: &str = "\
 Examples:
@@ -117,7 +117,7 @@ Examples:
   specgen learn learning.toml --response response.json
       learn with that response, independent of the spec's stiffness
   specgen learn learning.toml --socket link --machine stage-7  # (board)
-      on a machine, which is armed first and ramped down afterwards";
+      on a machine, which is armed first and ramped down at the end";
 
 pub const ROBUST: &str = "\
 Examples:
@@ -168,16 +168,16 @@ Examples:
   specgen commission platform.toml --plan
       what the machine would do, and for how long
   specgen commission platform.toml --socket rt.sock  # (board)
-      records in the folder `commission`, and platform.toml with their results
+      writes records, results and a new platform.toml to the folder `commission`
   specgen commission commission/platform.toml --socket rt.sock  # (board)
-      once the machine runs that controller: acceptance
+      after the machine was restarted with the new controller: acceptance test
   specgen commission platform.toml --socket rt.sock --again  # (board)
-      all of it again; with --step curves, the curves: later steps are open again
+      repeat all steps, or with --step curves that one; later ones are due again
   specgen commission platform.toml --step spec --write  # (board)
-      the results into platform.toml itself
+      write the results into platform.toml itself
 
-The legs move one at a time over their whole stroke. However it ends, the
-machine is ramped down. It asks once; without a terminal it needs --yes.";
+The legs move one at a time over their whole stroke. The command asks first;
+without a terminal it needs --yes. However it ends, the machine is ramped down.";
 
 pub const OPERATE: &str = "\
 Examples:
@@ -252,9 +252,9 @@ Examples:
   specgen identify record.csv --drive 0:100 --grid 16 --plot table.svg
   specgen identify record.csv --drive 0:100 --grid 16 -o table.csv
   specgen identify record.csv --drive 0:100 --columns drive_V=2 --rate 51.2
-      drive in column 2, time from the sampling rate
+      drive in column 2, time from the sampling rate in Hz
   specgen identify run.rec --spec platform.toml -o legs
-      legs that changed since identification; six tables to legs/
+      names legs that changed since identification; writes six tables to legs/
   specgen identify linear 1hz.csv 10hz.csv       # one frequency per record";
 
 pub const LINEAR: &str = "\

@@ -34,13 +34,15 @@ pub struct Arguments {
 
 #[derive(Subcommand, Debug)]
 enum Kind {
-    /// Gain ρ of a leg at several frequencies (Y = ρX + δ), relative to the lowest one (λ), and weights that are stable over λ.
+    /// Gain ρ of a leg at several frequencies (Y = ρX + δ), its ratio λ to the gain at the lowest one, and adaptation weights that
+    /// are stable for every λ found.
     Linear(LinearArguments),
     /// Frequency response from a swept sine, multisine or noise: resonance, damping, lag, dead time.
     Response(ResponseArguments),
-    /// Gain of each leg of a platform relative to its table, from a recorded run; writes the six tables.
+    /// Gain of each leg of a platform relative to its table, from a recorded run; writes six corrected tables.
     Gains(GainsArguments),
-    /// Cross-talk of the legs of an assembled platform, from records of `watch` in which one leg after the other is driven.
+    /// Cross-talk of the legs of an assembled platform, from six records of `specgen operate … watch`, each with one leg
+    /// driven.
     CrossTalk(CrossTalkArguments),
     /// Calibration of a gauge from its voltage and a reference.
     Gauge(GaugeArguments),
@@ -57,13 +59,13 @@ enum Kind {
 struct EverettArguments {
     /// Reversal-curve record (CSV, MATLAB, HDF5, TDMS, NumPy) with columns time_s, drive_V, displacement_um; further ones
     /// of the same leg, at other rates, are fitted together with it. With --spec: a recorded run of a platform, from which
-    /// gain, delay and cubic term of each leg are refitted.
+    /// gain, delay and cubic nonlinearity of each leg are fitted again.
     #[arg(required = true, value_name = "RECORD")]
     records: Vec<InputFile>,
     /// Voltage range of the table, V, such as 0:100 or -90:90.
     #[arg(long, value_name = "MIN:MAX", value_parser = range, allow_hyphen_values = true)]
     drive: Option<[f64; 2]>,
-    /// The spec that the target of a recorded run was built from. It has the range and the grid.
+    /// The spec of the controller that made the recorded run; gives the voltage range and the grid.
     #[arg(long, value_name = "SPEC", conflicts_with_all = ["drive", "grid", "dead_time", "model", "validate", "columns", "rate", "series", "max_size", "plot"])]
     spec: Option<InputFile>,
     /// Cells per axis of the Preisach grid; chosen by cross-validation over whole curves if not given.
@@ -76,12 +78,12 @@ struct EverettArguments {
     /// cross-validation or by the error on --validate.
     #[arg(long, value_name = "MODEL", value_parser = model, default_value = "preisach")]
     model: LegModelKind,
-    /// Another record of the leg, not used in the fit. It validates a table; with --model auto it selects the model: the
-    /// simplest whose error on it is within a tenth of the least.
+    /// Another record of the leg, not used in the fit, on which the error of the result is computed. With --model auto it
+    /// selects the model: the simplest whose error on it is within 10 % of the smallest.
     #[arg(long, value_name = "RECORD")]
     validate: Option<InputFile>,
-    /// Write the table to this file (CSV: up_V, down_V, everett_um). With --spec: the folder for six tables, leg0.csv to
-    /// leg5.csv, within that of the spec.
+    /// Write the table to this file (CSV: up_V, down_V, everett_um). With --spec: a folder for six tables, leg0.csv to
+    /// leg5.csv, inside the folder of the spec.
     #[arg(short, long, value_name = "FILE|DIR")]
     output: Option<OutputFileOrFolder>,
     #[command(flatten)]
@@ -132,10 +134,10 @@ struct ResponseArguments {
 struct GainsArguments {
     /// Recording of a run in which every leg moves slowly over much of its stroke, such as a wave on all axes.
     recording: InputFile,
-    /// The spec that the target was built from.
+    /// The spec of the controller that made the recording.
     #[arg(long, value_name = "SPEC")]
     spec: InputFile,
-    /// Folder for the six tables, leg0.csv to leg5.csv, within that of the spec.
+    /// Folder for the six tables, leg0.csv to leg5.csv, inside the folder of the spec.
     #[arg(short, long, value_name = "DIR")]
     output: Option<OutputFolder>,
 }
@@ -144,7 +146,8 @@ struct GainsArguments {
 #[derive(Args, Debug)]
 #[command(after_help = super::examples::CROSS_TALK)]
 struct CrossTalkArguments {
-    /// Files of `watch`, for legs 0 to 5 in order: three raised cosines of 20 V of that leg alone, 0.5 s each.
+    /// Files that `watch` wrote, for legs 0 to 5 in order. In each, that leg alone makes three raised-cosine strokes of 20 V,
+    /// 0.5 s each.
     #[arg(required = true, value_name = "RECORD")]
     records: Vec<InputFile>,
 }
@@ -237,10 +240,10 @@ struct BenchArguments {
     /// Sampling rate, Hz: time is computed from the column `sample`, or else from row numbers.
     #[arg(long, value_name = "HZ", value_parser = number("Hz", "samples per second above zero", 1e-3..=1e9), allow_negative_numbers = true)]
     rate: Option<f64>,
-    /// Table to read of a file that has several, by number (from 1) or name; the longest if not given.
+    /// Which table of a file to read, by number (from 1) or name; the longest if not given.
     #[arg(long, value_name = "N|NAME")]
     series: Option<String>,
-    /// Largest size in memory of a record that is packed or binary, such as 500MB or 4GB; its numbers take 8 bytes each.
+    /// Largest size in memory of a compressed or binary record, such as 500MB or 4GB. Each number takes 8 bytes.
     #[arg(long, value_name = "SIZE", value_parser = size, default_value = "2GB")]
     max_size: u64,
     #[command(flatten)]

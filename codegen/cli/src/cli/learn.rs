@@ -20,7 +20,7 @@ use super::sim::{PlantArguments, frequency};
 #[derive(Args, Debug)]
 #[command(after_help = super::examples::LEARN)]
 pub struct Arguments {
-    /// The spec file, with `control.correction`.
+    /// The spec file; it must have the key `control.correction`.
     spec: InputFile,
     /// Motion to learn: case-1, case-2, machining, multisine or the name of a trajectory of the spec; case-1 if not given. A
     /// machine over the link learns only trajectories of its spec.
@@ -30,11 +30,12 @@ pub struct Arguments {
     #[arg(long, value_name = "HZ", value_parser = frequency, allow_negative_numbers = true)]
     frequency: Option<f64>,
     /// Largest number of learning passes. Learning ends early after two passes in a row without improvement, or after the third
-    /// pass that is worse than the best one.
+    /// pass that is worse than the best so far.
     #[arg(long, value_name = "N", default_value_t = 5, allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(0..=1000))]
     passes: u32,
-    /// Highest frequency to learn, Hz; lowered until learning converges on every machine within [robust]. With --excite, the
-    /// sweeps reach 1.6 times this frequency, or 0.4 times the knots (samples of the correction) per second if that is lower.
+    /// Highest frequency to learn, Hz. It is lowered until learning converges on every machine within the uncertainties of
+    /// [robust]. With --excite, the sweeps reach 1.6 times this frequency, but at most 0.4 times the knots (samples of the
+    /// correction) per second.
     #[arg(long, value_name = "HZ", value_parser = number("Hz", "a frequency from 0.001 to 4000 Hz", 1e-3..=4e3), allow_negative_numbers = true, default_value_t = BANDWIDTH)]
     bandwidth: f64,
     /// Range of an uncertainty, instead of that of [robust] or the default: `stiffness=2%`, `gain=0.9:1.1`, `delay_ticks=0`.
@@ -43,7 +44,7 @@ pub struct Arguments {
     /// Start from the correction that the model predicts for lag, modes and hysteresis.
     #[arg(long, conflicts_with = "from")]
     prepare: bool,
-    /// Start from this correction, of the same spec, machine and motion.
+    /// Start from the correction in this file, learned with the same spec, machine and motion.
     #[arg(long, value_name = "FILE")]
     from: Option<InputFile>,
     /// Do not learn. Measure the response of the running loop to corrections (sweeps during passes of the motion), and write it
@@ -58,7 +59,7 @@ pub struct Arguments {
     #[arg(long, value_name = "KNOTS", num_args = 0..=1, default_missing_value = "4096", conflicts_with_all = ["excite", "response"],
           value_parser = clap::value_parser!(u32).range(1..=1 << 20))]
     on_device: Option<u32>,
-    /// Write the resulting correction to this file (JSON): that of the last pass whose improvement exceeded its noise.
+    /// Write the resulting correction to this file (JSON): that of the last pass that improved by more than its noise.
     #[arg(short, long, value_name = "FILE")]
     output: Option<OutputFile>,
     /// Learn on this machine: it is armed first and ramped down afterwards.

@@ -17,7 +17,7 @@ pub struct Line {
     /// Baud rate of the serial port.
     #[arg(long, default_value_t = BAUD, requires = "port", conflicts_with = "socket", value_parser = clap::value_parser!(u32).range(1200..=12_000_000))]
     baud: u32,
-    /// Unix socket of a program that serves the link.
+    /// Unix socket of a controller program on this computer (`rt-pc --link PATH`).
     #[arg(long, value_name = "PATH")]
     socket: Option<Endpoint>,
 }
