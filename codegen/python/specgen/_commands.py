@@ -223,7 +223,7 @@ def simulate(
     Args:
         trajectory: Play only this trajectory of the spec; otherwise rest, waves, and every trajectory.
         frequency: Frequency of the waves, Hz; 1 and 10 if not given.
-        latency: Extra delay from controller to amplifiers, in control intervals.
+        latency: Extra delay from controller to amplifiers, in ticks.
         samples: Without ``[control]``, control ticks per period of the motion.
         paper: Run the paper's experiments instead.
         plant: Hysteresis model of the legs: ``plays``, ``bouc-wen``, or a file of leg parameters.

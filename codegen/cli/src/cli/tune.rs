@@ -53,7 +53,7 @@ pub struct Arguments {
     /// drift: rad/s with [control], otherwise weights per tick.
     #[arg(long, value_name = "GROUP=LOW:HIGH", value_parser = bounds)]
     bounds: Vec<GivenBounds>,
-    /// With [control]: extra delay from controller to amplifiers, in control intervals.
+    /// With [control]: extra delay from controller to amplifiers, in ticks (control periods).
     #[arg(long, default_value_t = 0, allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(0..=100))]
     latency: u32,
     /// Number of worker threads; one per processor if not given. The result does not depend on it.
