@@ -269,8 +269,8 @@ pub fn eight() -> String {
 
 fn table(text: &str, period: f64, repeat: bool) -> (Model, Result<ir::Setpoints, Vec<Diagnostic>>) {
     let file = "eight.csv".to_owned();
-    let waveform = waveform::parse(text, &file, period).unwrap();
-    let model = with_trajectories(vec![TrajectoryKind::Waveform { file, period, repeat }]);
+    let waveform = waveform::parse(text, &file, period, None).unwrap();
+    let model = with_trajectories(vec![TrajectoryKind::Waveform { file, period, repeat, columns: None }]);
     let setpoints = lowered(&model, &[Some(waveform)], Scalar::F64);
     (model, setpoints)
 }
@@ -278,7 +278,7 @@ fn table(text: &str, period: f64, repeat: bool) -> (Model, Result<ir::Setpoints,
 #[test]
 fn a_table_goes_through_its_rows_with_continuous_acceleration_from_rest_to_rest() {
     let text = eight();
-    let rows = waveform::parse(&text, "eight.csv", 1e-3).unwrap().rows;
+    let rows = waveform::parse(&text, "eight.csv", 1e-3, None).unwrap().rows;
     let (model, setpoints) = table(&text, 1e-3, false);
     let targets = play(&model, &plan::<f64>(&model, &setpoints.unwrap()), 0);
     assert_eq!(targets.len(), 4000);
@@ -342,8 +342,8 @@ fn tables_with_jumps_wrong_units_or_places_out_of_reach_are_refused_by_line() {
 /// A table of x (µm) in rows 1 ms apart that repeats: the warnings, or what refuses it.
 fn repeated(rows: impl Iterator<Item = f64>) -> Vec<Diagnostic> {
     let text = rows.fold("x_um\n".to_owned(), |text, um| text + &format!("{um:e}\n"));
-    let waveform = waveform::parse(&text, "wave.csv", 1e-3).unwrap();
-    let kind = TrajectoryKind::Waveform { file: "wave.csv".to_owned(), period: 1e-3, repeat: true };
+    let waveform = waveform::parse(&text, "wave.csv", 1e-3, None).unwrap();
+    let kind = TrajectoryKind::Waveform { file: "wave.csv".to_owned(), period: 1e-3, repeat: true, columns: None };
     let model = with_trajectories(vec![kind]);
     let task = model.task_space.as_ref().unwrap();
     match setpoint::lower(&model, task, &[Some(waveform)], Scalar::F64) {

@@ -67,7 +67,7 @@ fn emitted_targets(controller: &mut Controller, selector: u64) -> (Vec<[f64; 6]>
 #[test]
 fn the_emitted_controller_plays_the_papers_paths_and_a_table() {
     let text = eight();
-    let rows = waveform::parse(&text, "eight.csv", 1e-3).unwrap().rows;
+    let rows = waveform::parse(&text, "eight.csv", 1e-3, None).unwrap().rows;
     let each = [("setpoint-f64", &[WITH_TABLES][..], 1e-12), ("setpoint-f32", &[WITH_TABLES, F32][..], 0.1e-9)];
     for (name, edits, tolerance) in each.into_iter().take(length(1, 2)) {
         let records = [("eight.csv", text.clone()), ("line.csv", line())];

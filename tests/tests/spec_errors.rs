@@ -288,6 +288,11 @@ fn bad_literals(item: Item) -> Vec<(&'static str, String, Code)> {
                 bad.push(("no reason", reason.to_owned(), codes::WRONG_TYPE));
             }
         }
+        Item::Columns => {
+            for columns in ["\"\"", "\"drive_V\"", "2"] {
+                bad.push(("no description", columns.to_owned(), codes::WRONG_TYPE));
+            }
+        }
         Item::Name => {
             for name in ["", "1st", "two words", "größe", "a/b"] {
                 bad.push(("not a name", format!("\"{name}\""), codes::BAD_NAME));

@@ -132,7 +132,7 @@ fn a_waveform_is_named_and_not_read() {
         "[[trajectory]]\nname = \"w\"\nkind = \"waveform\"\nfile = \"none.csv\"\nperiod = \"2 ms\"\nrepeat = true\n";
     let (model, findings) = spec::load(&source(&format!("{text}\n{waveform}"), "spec.toml", &folder));
     assert!(findings.is_empty(), "{findings:#?}");
-    let kind = TrajectoryKind::Waveform { file: "none.csv".to_owned(), period: 2e-3, repeat: true };
+    let kind = TrajectoryKind::Waveform { file: "none.csv".to_owned(), period: 2e-3, repeat: true, columns: None };
     let space = model.and_then(|model| model.task_space).expect("a model");
     assert_eq!(space.trajectories[3], Trajectory { name: "w".to_owned(), lead: None, kind });
 

@@ -43,6 +43,8 @@ pub(crate) struct Format {
     pub(crate) whole_line: Option<[&'static str; 2]>,
     /// Whether a preamble may precede the names.
     pub(crate) preamble: bool,
+    /// Help for a file without a header.
+    pub(crate) expected: &'static str,
 }
 
 /// Records of the bench.
@@ -53,6 +55,7 @@ pub(crate) const RECORD: Format = Format {
     longer_lines: true,
     whole_line: None,
     preamble: true,
+    expected: "the first line must be the header `time_s,drive_V,displacement_um`",
 };
 
 /// Most samples; a few columns of this length take a gigabyte.
@@ -155,7 +158,7 @@ pub(crate) fn open_part<'a>(
     }
     let found = head::find(&ahead, format.preamble);
     if found.is_none() && format.preamble {
-        return findings.refuse(format.header, None, "is empty".to_owned(), EMPTY);
+        return findings.refuse(format.header, None, "is empty".to_owned(), format.expected);
     }
     let mut head = found.unwrap_or_else(|| Head { next: ahead.len(), ..Head::without_names(1, b',') });
     let simulated = ahead.drain(..head.next).fold(marked, |marked, (_, line)| marked | is_mark(&line));
@@ -211,9 +214,10 @@ fn sorted(names: &[String]) -> Vec<String> {
     names
 }
 
-/// Whether a line of `text` has a value in column `at`.
+/// Whether a line of `text` below its names has a value in column `at`.
 pub(crate) fn has_values(text: &str, head: &Head, at: usize) -> bool {
-    let lines = text.split(['\n', '\r']).map(str::as_bytes).filter(|line| has_fields(line));
+    let text = text.replace("\r\n", "\n");
+    let lines = text.split(['\n', '\r']).skip(head.line).map(str::as_bytes).filter(|line| has_fields(line));
     lines.map(|line| split(line, head.separator)).any(|fields| fields.get(at).is_some_and(|field| !field.is_empty()))
 }
 
@@ -229,9 +233,9 @@ pub(crate) enum Content<'a> {
 pub(crate) type Reader<'a> = Box<dyn FnOnce(&[Column], &mut Findings) -> Samples + 'a>;
 
 impl<'a> Content<'a> {
-    /// Curves of a text, as in [`Part`].
-    pub(crate) fn curves(&self) -> usize {
-        if let Self::Text(_, part) = self { part.curves } else { 0 }
+    /// Curves and sweeps of a text, as in [`Part`].
+    pub(crate) fn curves(&self) -> [usize; 2] {
+        if let Self::Text(_, part) = self { [part.curves, part.sweeps] } else { [0; 2] }
     }
 
     /// Rows of numbers.
@@ -243,10 +247,10 @@ impl<'a> Content<'a> {
     }
 
     /// The names, and what reads the columns below them; `None` after the problem was reported.
-    pub(crate) fn open(self, findings: &mut Findings) -> Option<(Head, Reader<'a>)> {
+    pub(crate) fn open(self, format: &'static Format, findings: &mut Findings) -> Option<(Head, Reader<'a>)> {
         match self {
             Self::Text(text, part) => {
-                let (head, lines) = open_part(text, part, &RECORD, findings)?;
+                let (head, lines) = open_part(text, part, format, findings)?;
                 Some((head, Box::new(|wanted, findings| lines.read(wanted, findings))))
             }
             Self::Arrays(arrays, comment) => Some((
@@ -280,7 +284,6 @@ fn of_arrays(arrays: &[(String, Vec<f64>)], comment: &str, wanted: &[Column], fi
 }
 
 const ONE_EACH: &str = "one value to each column, a point as decimal sign";
-const EMPTY: &str = "the first line must be the header `time_s,drive_V,displacement_um`";
 
 /// Reports an invalid byte `byte` at position `at` of its line.
 fn not_text(line: Option<usize>, at: usize, byte: u8, findings: &mut Findings) {
@@ -335,8 +338,8 @@ impl Lines<'_> {
             }
             signs.look_at(&fields);
         }
-        if let Some((column, line, text)) = signs.doubt() {
-            self.format.report_doubt(line, wanted[column].name, text, findings);
+        if let Some((column, line, text, is_likely)) = signs.doubt() {
+            self.format.report_doubt(line, wanted[column].name, (text, is_likely), findings);
         }
         Samples { lines, columns, simulated: self.simulated }
     }
@@ -418,7 +421,11 @@ impl Lines<'_> {
             None => {
                 let shown: String = text.chars().take(40).collect();
                 let message = format!("`{name}` is `{shown}`, which is not a number");
-                let help = "write a plain number with a decimal point, such as -12.5e-3";
+                let help = if number::is_grouped(&text) {
+                    "export without a sign between thousands"
+                } else {
+                    "write a plain number with a decimal point, such as -12.5e-3"
+                };
                 findings.add(format.value, Some(line), message, help);
             }
         }
@@ -443,8 +450,14 @@ impl Format {
         f64::NAN
     }
 
-    fn report_doubt(&self, line: usize, name: &str, text: &str, findings: &mut Findings) {
+    /// Reports a sign that may divide thousands, and whether that is likely.
+    fn report_doubt(&self, line: usize, name: &str, (text, is_likely): (&str, bool), findings: &mut Findings) {
         let sign = if text.contains(',') { "comma" } else { "point" };
+        if !is_likely {
+            let message = format!("`{name}` is `{text}`: the {sign} is read as the decimal sign");
+            let help = "if it divides thousands, export without a sign between thousands";
+            return findings.add(codes::RECORD_PART, Some(line), message, help);
+        }
         let message =
             format!("`{name}` is `{text}`: the {sign} may divide thousands, and no number shows that it does not");
         let help = "export without a sign between thousands, and with a point and four decimals";

@@ -9,11 +9,14 @@ mod npy;
 mod tdms;
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 
 use super::columns::names::quantity;
 use super::tables::{Extent, listed};
 pub(crate) use bytes::{FARTHEST, Refusal, unpack};
 use bytes::{Form, INEXACT, MOST_ARRAYS};
+pub(crate) use npy::only_file;
+use specgen_language::interrupt::Interruption;
 
 /// Names and values.
 pub(crate) type Columns = Vec<(String, Vec<f64>)>;
@@ -113,13 +116,13 @@ impl Kind {
     /// # Errors
     /// Reason why it has none, as a text that follows the name of the file.
     pub(crate) fn tables(self, file: Vec<u8>, limit: u64) -> Result<Tables, Refusal> {
-        let contents = match self {
+        let contents = guarded(|| match self {
             Self::Mat => mat::contents(&file, limit),
             Self::Mat73 | Self::Hdf5 => hdf5::contents(file, limit),
             Self::Tdms => tdms::contents(&file, limit),
             Self::Npy => npy::contents(&file, limit),
             Self::Npz => npy::of_archive(&file, limit),
-        };
+        });
         let found = match contents {
             Ok(contents) if contents.is_full() => {
                 return Err(format!("cannot be read: it has more than {MOST_ARRAYS} arrays or names").into());
@@ -134,6 +137,21 @@ impl Kind {
         let there = if found.left_out.is_empty() { "nothing".to_owned() } else { listed(&found.left_out) };
         Err(format!("has no two arrays of numbers of one length for the columns, but {there}").into())
     }
+}
+
+/// What a reader gives. A panic in it, which a damaged file may cause, refuses the file.
+fn guarded(read: impl FnOnce() -> Result<Contents, Refusal>) -> Result<Contents, Refusal> {
+    let read = || {
+        #[cfg(test)]
+        tests::injected();
+        read()
+    };
+    catch_unwind(AssertUnwindSafe(read)).unwrap_or_else(|cause| {
+        if cause.is::<Interruption>() {
+            resume_unwind(cause);
+        }
+        Err("its reader failed, most likely because it is damaged; if other programs read it, please report it".into())
+    })
 }
 
 impl Contents {
@@ -292,5 +310,37 @@ impl Table {
         let is_number = |name: &str| name.trim().parse::<f64>().is_ok();
         let named = |name: String| if is_number(&name) { format!("column {name}") } else { name };
         self.columns.into_iter().map(|(name, values)| (named(name), values)).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::cell::Cell;
+
+    use crate::{Reading, decode_record};
+    use specgen_language::diagnostic::codes;
+
+    thread_local! {
+        static PANICS: Cell<bool> = const { Cell::new(false) };
+    }
+
+    /// A panic in the middle of a reader.
+    pub(super) fn injected() {
+        assert!(!PANICS.get(), "injected");
+    }
+
+    #[test]
+    fn a_panic_of_a_reader_is_a_finding() {
+        let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("src/record/tests/containers");
+        for name in ["v5.mat", "v7.3.mat", "record.h5", "record.tdms"] {
+            let file = std::fs::read(folder.join(name)).unwrap();
+            let read = || decode_record(file.clone(), name, &Reading::default());
+            assert!(read().is_ok(), "{name}");
+            PANICS.set(true);
+            let found = read().unwrap_err();
+            PANICS.set(false);
+            assert_eq!((found.len(), found[0].code), (1, codes::RECORD_NOT_TEXT.id), "{name}");
+            assert!(found[0].message.contains("its reader failed"), "{found:?}");
+        }
     }
 }

@@ -7,7 +7,9 @@ use crate::leg_model::{Around, Family, FamilyScore, LegModel, choose, on_grid};
 use crate::mode::Mode;
 use crate::rate::period::{INVERTED, Invertible};
 use crate::rate::{CreepTerm, Inertia, RateModel};
-use crate::{Options, Report, is_simulated, is_table_csv, parse_record, rate, read_file, read_leg_csv};
+use crate::reading::Reading;
+use crate::record::parse_record_as;
+use crate::{Options, Report, is_simulated, is_table_csv, rate, read_file, read_leg_csv};
 use specgen_language::diagnostic::{Code, Diagnostic, Place, codes};
 use specgen_language::model::{Actuator, Hysteresis, MAX_GRID, Mcu, Model, RateDependence, Scalar};
 use specgen_language::spec::LegLines;
@@ -171,7 +173,8 @@ impl SpecRecords {
         } else {
             let options = Options::new(model.hysteresis.grid, model.actuator.voltage);
             let options = Options { finest: finest(model), ..options };
-            let record = parse_record(&text, name)?;
+            let reading = Reading::of_key(model.hysteresis.columns.as_deref(), name, codes::RECORD_HEADER)?;
+            let record = parse_record_as(&text, name, &reading)?;
             let choice = choose(&record, None, &options, model.hysteresis.model).map_err(about_voltage)?;
             let identified = choice.table;
             if matches!(model.hysteresis.rate, RateDependence::Creep(_)) {

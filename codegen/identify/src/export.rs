@@ -75,6 +75,7 @@ pub(crate) fn read_nodes(
         longer_lines: false,
         whole_line: Some(line),
         preamble: false,
+        expected: help,
     };
     let (_, lines) = columns::open(text.as_bytes(), &format, findings)?;
     let Samples { lines, columns: values, .. } = lines.read(&[0, 1, 2].map(|at| Column::plain(at, "")), findings);

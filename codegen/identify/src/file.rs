@@ -9,7 +9,7 @@ use std::path::Path;
 use flate2::read::MultiGzDecoder;
 
 use super::columns::{self, Content, MAX_SAMPLES, MOST_TABLES, Part, foreign, names};
-use super::container::{Columns, FARTHEST, Kind, Refusal, Table, unpack};
+use super::container::{Columns, FARTHEST, Kind, Refusal, Table, only_file, unpack};
 use super::findings::Findings;
 use super::reading::{MaxSize, Reading, shown_size};
 use super::tables::{self, Choice, Extent};
@@ -131,7 +131,10 @@ fn is_record(table: &Extent) -> bool {
 
 /// Whether a file that begins so is unpacked in memory.
 fn is_packed(first: &[u8]) -> bool {
-    Kind::of(first).is_some() || first.starts_with(&[0x1f, 0x8b]) || utf_16(first).is_some()
+    Kind::of(first).is_some()
+        || first.starts_with(&[0x1f, 0x8b])
+        || first.starts_with(b"PK\x03\x04")
+        || utf_16(first).is_some()
 }
 
 /// Whether the text in UTF-16 that begins so has its high bytes first, and the length of its mark. Without a mark, its
@@ -147,7 +150,7 @@ fn utf_16(first: &[u8]) -> Option<(bool, usize)> {
     }
 }
 
-/// Unpacks gzip, then UTF-16; `None` after the problem was reported.
+/// Unpacks gzip or a ZIP archive of one file, then UTF-16; `None` after the problem was reported.
 fn unpacked(mut file: Vec<u8>, limit: MaxSize, findings: &mut Findings) -> Option<Unpacked> {
     if file.starts_with(&[0x1f, 0x8b]) {
         let mut content = Vec::new();
@@ -164,6 +167,17 @@ fn unpacked(mut file: Vec<u8>, limit: MaxSize, findings: &mut Findings) -> Optio
             return too_large("unpacked, is", size, limit, findings);
         }
         file = content;
+    }
+    if Kind::of(&file).is_none() && file.starts_with(b"PK\x03\x04") {
+        match only_file(&file, limit.bytes) {
+            Ok(None) => {}
+            Ok(Some(content)) => file = content,
+            Err(Refusal::Large(size)) => return too_large("unpacked, is", size, limit, findings),
+            Err(Refusal::Because(why)) => {
+                let message = format!("is a ZIP archive and cannot be unpacked: {why}");
+                return findings.refuse(codes::RECORD_NOT_TEXT, None, message, "unpack it, or pack it again");
+            }
+        }
     }
     if let Some(kind) = Kind::of(&file) {
         return Some(Unpacked::Tables(kind, file));

@@ -2,8 +2,11 @@
 
 mod scale;
 
-use super::columns::names::{Conversion, QUANTITIES, Quantity};
+use super::columns::names::{self, COORDINATES, Conversion, QUANTITIES, Quantity};
+use crate::findings::Findings;
 use scale::Scaled;
+use specgen_language::diagnostic::{Code, Diagnostic};
+use specgen_language::shell;
 
 /// How to read records whose names are not standard. By default, by their names.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -15,6 +18,8 @@ pub struct Reading {
     series: Option<String>,
     /// Largest size of what is unpacked in memory, bytes.
     max_size: MaxSize,
+    /// Whether the key `columns` of a spec describes them, not the option `--columns`.
+    is_key: bool,
 }
 
 /// Limit of what is unpacked in memory: of the bytes of the file, packed and unpacked, and of its numbers at 8 bytes each.
@@ -98,6 +103,29 @@ impl Reading {
         }
     }
 
+    /// From the key `columns` of a spec, for a file with this name; by the names in the file if it is not given.
+    ///
+    /// # Errors
+    /// A finding with the expected form.
+    pub(crate) fn of_key(columns: Option<&str>, shown_as: &str, code: Code) -> Result<Self, Vec<Diagnostic>> {
+        let given: Vec<String> = columns.map(str::to_owned).into_iter().collect();
+        Self::new(&given, None).map(|reading| Self { is_key: true, ..reading }).map_err(|why| {
+            let mut findings = Findings::new(shown_as);
+            findings.add(code, None, format!("`columns` of the spec: {why}"), "describe a column as in `x_um=2`");
+            findings.into_diagnostics()
+        })
+    }
+
+    /// What describes the columns, for a message.
+    pub(crate) fn option(&self) -> &'static str {
+        if self.is_key { "`columns` of the spec" } else { "`--columns`" }
+    }
+
+    /// `columns` as they are given.
+    pub(crate) fn given(&self, columns: &str) -> String {
+        if self.is_key { format!("columns = {columns:?}") } else { format!("--columns {}", shell::quoted(columns)) }
+    }
+
     /// The same, of the table with this name or number (from 1) in a file that has several.
     #[must_use]
     pub fn of_series(self, series: Option<String>) -> Self {
@@ -149,7 +177,7 @@ impl Reading {
 /// The entries of a list. A comma within a header separates nothing: an entry begins with a name and `=`.
 fn entries(list: &str) -> Vec<String> {
     let begins = |piece: &str| {
-        let is_letter = |c: char| c.is_ascii_alphanumeric() || c == '_';
+        let is_letter = |c: char| c.is_alphanumeric() || matches!(c, '_' | '/' | '^');
         piece.split_once('=').is_some_and(|(name, _)| !name.trim().is_empty() && name.trim().chars().all(is_letter))
     };
     let mut entries: Vec<String> = Vec::new();
@@ -181,7 +209,7 @@ fn column_choice(text: String) -> Result<ColumnChoice, String> {
             scaled: None,
         });
     }
-    let found = QUANTITIES.iter().find_map(|quantity| match quantity.per_of(&name) {
+    let found = names::all().find_map(|quantity| match quantity.per_of(&name) {
         Some(per) => Some((quantity, Some(per))),
         None => (name == quantity.plain()).then_some((quantity, None)),
     });
@@ -200,8 +228,9 @@ fn column_choice(text: String) -> Result<ColumnChoice, String> {
 
 fn unknown(name: &str) -> String {
     let plain = name.split('_').next().unwrap_or(name);
-    let near = QUANTITIES.iter().find(|quantity| quantity.plain().eq_ignore_ascii_case(plain));
-    let all = || QUANTITIES.iter().map(|quantity| format!("`{}`", quantity.name)).collect::<Vec<_>>().join(", ");
+    let near = names::all().find(|quantity| quantity.plain().eq_ignore_ascii_case(plain));
+    let usual = QUANTITIES.iter().chain(&COORDINATES).map(|quantity| format!("`{}`", quantity.name));
+    let all = || usual.collect::<Vec<_>>().join(", ");
     let known = near.map_or_else(|| all() + ", `sample`", Quantity::all_names);
     format!("`{name}` is not a column name; expected one of {known}")
 }

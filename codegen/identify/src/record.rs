@@ -134,9 +134,14 @@ pub fn decode_record(file: Vec<u8>, shown_as: &str, reading: &Reading) -> Result
 /// # Errors
 /// As [`read_record`].
 pub fn parse_record(text: &str, shown_as: &str) -> Result<Record, Vec<Diagnostic>> {
+    parse_record_as(text, shown_as, &Reading::default())
+}
+
+/// The same with a description of its columns.
+pub(crate) fn parse_record_as(text: &str, shown_as: &str, reading: &Reading) -> Result<Record, Vec<Diagnostic>> {
     let mut findings = Findings::new(shown_as);
     match Source::of_text(text.as_bytes(), None, &mut findings) {
-        Some(text) => of_source(text, &Reading::default(), findings),
+        Some(text) => of_source(text, reading, findings),
         None => Err(findings.into_diagnostics()),
     }
 }
@@ -144,7 +149,7 @@ pub fn parse_record(text: &str, shown_as: &str) -> Result<Record, Vec<Diagnostic
 /// Columns of a record; the displacement is optional in a record for prediction.
 pub(crate) const fn wanted(displacement: bool) -> [ColumnSpec; 4] {
     let [time, drive, moved] = NAMES;
-    let moved = ColumnSpec { name: moved, required: displacement };
+    let moved = ColumnSpec { required: displacement, ..required(moved) };
     [required(time), required(drive), optional(MONITOR), moved]
 }
 

@@ -5,7 +5,7 @@ mod places;
 use std::path::Path;
 
 pub(crate) use super::columns::TIME;
-use super::columns::{Column, Head, LineNumbers, Samples, names};
+use super::columns::{Column, Format, Head, LineNumbers, RECORD, Reader, Samples, names};
 use super::file::{Source, open_file};
 use super::findings::Findings;
 use super::reading::Reading;
@@ -21,14 +21,16 @@ pub(crate) struct ColumnSpec {
     pub(crate) name: &'static str,
     /// Whether the record is refused without it.
     pub(crate) required: bool,
+    /// Number of the quantity's units in one of the values: 1, or 10⁶ µm in a metre.
+    pub(crate) per: f64,
 }
 
 pub(crate) const fn required(name: &'static str) -> ColumnSpec {
-    ColumnSpec { name, required: true }
+    ColumnSpec { name, required: true, per: 1.0 }
 }
 
 pub(crate) const fn optional(name: &'static str) -> ColumnSpec {
-    ColumnSpec { name, required: false }
+    ColumnSpec { name, required: false, per: 1.0 }
 }
 
 /// Columns of equal length, in the requested order, in the units of their names.
@@ -92,11 +94,12 @@ pub(crate) fn columns_of(
     reading: &Reading,
     findings: &mut Findings,
 ) -> Option<Signals> {
-    let (curves, rows) = (content.curves(), content.rows());
-    let (header, read) = content.open(findings)?;
-    if wanted[0].name == TIME && curves >= CURVES && !has_time(&header, reading) {
+    let ([curves, sweeps], rows) = (content.curves(), content.rows());
+    let (header, read) = content.open(&RECORD, findings)?;
+    let curves = if reading.rate().is_none() && sweeps > curves { sweeps } else { curves };
+    if wanted[0].name == TIME && wanted[0].required && curves >= CURVES && !has_time(&header, reading) {
         let message = format!(
-            "has {curves} curves between blank lines, each in one direction and without times, as magnetometers record FORC: the way back to each reversal was not recorded, so the drive between the curves is not known"
+            "has {curves} curves, each in one direction and without times, as magnetometers record FORC: the way back to each reversal was not recorded, so the drive between the curves is not known"
         );
         let help = "record time, drive and displacement without a break, on the ways back as well";
         return findings.refuse(codes::RECORD_GAP, None, message, help);
@@ -112,7 +115,25 @@ pub(crate) fn columns_of(
             "write a line for each sample, not for each column",
         );
     }
-    let places = places::find(&header, wanted, reading, findings)?;
+    let mut signals = assigned(&header, read, wanted, (reading, &RECORD), findings)?;
+    if let (TIME, Some(Some(time)), false) = (wanted[0].name, signals.columns.first(), findings.any_error())
+        && let Some(stretch) = stretches::chosen(time, choice, findings)
+    {
+        signals.lines = signals.lines.part(stretch.clone());
+        signals.columns.iter_mut().flatten().for_each(|column| *column = column[stretch.clone()].to_vec());
+    }
+    Some(signals)
+}
+
+/// The `wanted` columns below a header, as the user describes them, in a file of this kind.
+pub(crate) fn assigned(
+    header: &Head,
+    read: Reader,
+    wanted: &[ColumnSpec],
+    (reading, format): (&Reading, &Format),
+    findings: &mut Findings,
+) -> Option<Signals> {
+    let places = places::find(header, wanted, (reading, format), findings)?;
     let there: Vec<Column> = places.columns.iter().flatten().copied().collect();
     let Samples { lines, columns: values, simulated } = read(&there, findings);
     let mut values = values.into_iter();
@@ -126,14 +147,7 @@ pub(crate) fn columns_of(
             None => *time = Some((0..lines.len()).map(|k| k as f64 * interval).collect()),
         }
     }
-    let mut signals = Signals { shown_as: findings.path().to_owned(), lines, columns, simulated, warnings: Vec::new() };
-    if let (TIME, Some(Some(time)), false) = (wanted[0].name, signals.columns.first(), findings.any_error())
-        && let Some(stretch) = stretches::chosen(time, choice, findings)
-    {
-        signals.lines = signals.lines.part(stretch.clone());
-        signals.columns.iter_mut().flatten().for_each(|column| *column = column[stretch.clone()].to_vec());
-    }
-    Some(signals)
+    Some(Signals { shown_as: findings.path().to_owned(), lines, columns, simulated, warnings: Vec::new() })
 }
 
 /// Numbers in each of a few lines from which a file has a line for each column.

@@ -1,10 +1,13 @@
 //! Reads states of a platform: a CSV file of eighteen columns with a line of names, in SI units unless a name has another
 //! unit, such as `x (um)`, `vz [um/s]` or `ax_um/s^2`. The columns have a fixed order. A name that says another place or
-//! ends with what may be an unknown unit is refused.
+//! ends with what may be an unknown unit is refused. A description of the columns replaces order and names.
 
-use crate::columns::names::{COORDINATES, Conversion, PER_TIME, plain};
+use crate::columns::names::{COORDINATES, Conversion, PER_TIME, RATES, plain};
 use crate::columns::{self, Column, Format, RECORD};
+use crate::file::Source;
 use crate::findings::Findings;
+use crate::reading::Reading;
+use crate::signals::{self, ColumnSpec, required};
 use specgen_language::diagnostic::{Diagnostic, codes};
 
 /// Pose, rate and acceleration of the six coordinates: m and rad, per s, per s².
@@ -12,15 +15,49 @@ pub type State = [[f64; 6]; 3];
 
 const FORMAT: Format = Format { preamble: false, ..RECORD };
 const COLUMNS: usize = 18;
-const HELP: &str = "write 18 names, of pose, rate and acceleration in x, y, z, θx, θy, θz, such as `x,y,z,rx,ry,rz,vx,…` or `x (um),…`";
+const HELP: &str = "write 18 names, of pose, rate and acceleration in x, y, z, θx, θy, θz, such as `x,y,z,rx,ry,rz,vx,…` or `x (um),…`, or describe all columns by `--columns x_um=1,y_um=2,…`";
 
-/// States from the text of their file, in order.
+/// States from the text of their file, in order, as the user describes its columns.
 ///
 /// # Errors
 /// All findings of the file.
-pub fn parse(text: &str, shown_as: &str) -> Result<Vec<State>, Vec<Diagnostic>> {
+pub fn parse(text: &str, shown_as: &str, reading: &Reading) -> Result<Vec<State>, Vec<Diagnostic>> {
     let mut findings = Findings::new(shown_as);
-    let states = columns::open(text.as_bytes(), &FORMAT, &mut findings).and_then(|(header, lines)| {
+    let is_described = reading.chosen().next().is_some();
+    let states = if is_described { described(text, reading, &mut findings) } else { in_order(text, &mut findings) };
+    findings.conclude(states).map(|(states, _)| states)
+}
+
+fn described(text: &str, reading: &Reading, findings: &mut Findings) -> Option<Vec<State>> {
+    let quantities = || COORDINATES.iter().chain(&RATES);
+    // A name without unit is not of µm here.
+    if let Some(missing) = quantities().find(|quantity| reading.column(quantity.name).is_none()) {
+        let message = format!("`--columns` describes no `{}`", missing.name);
+        let help = "describe all 18 columns, each with its unit, such as `x_mm=1`";
+        return findings.refuse(codes::RECORD_HEADER, None, message, help);
+    }
+    let wanted: Vec<ColumnSpec> =
+        quantities().map(|quantity| ColumnSpec { per: 1e6, ..required(quantity.name) }).collect();
+    let Source { content, choice } = Source::of_text(text.as_bytes(), None, findings)?;
+    if choice.of > 1 || !findings.is_empty() {
+        let message = "lines of text divide its rows".to_owned();
+        return findings.refuse(codes::RECORD_VALUE, None, message, "delete the text between the rows");
+    }
+    let (header, rows) = content.open(&RECORD, findings)?;
+    let columns = signals::assigned(&header, rows, &wanted, (reading, &RECORD), findings)?.columns;
+    Some(rows_of(&columns.into_iter().map(Option::unwrap_or_default).collect::<Vec<_>>()))
+}
+
+/// The rows of eighteen columns.
+fn rows_of(columns: &[Vec<f64>]) -> Vec<State> {
+    let state = |row: usize| -> State {
+        core::array::from_fn(|part| core::array::from_fn(|axis| columns[6 * part + axis][row]))
+    };
+    (0..columns.first().map_or(0, Vec::len)).map(state).collect()
+}
+
+fn in_order(text: &str, findings: &mut Findings) -> Option<Vec<State>> {
+    columns::open(text.as_bytes(), &FORMAT, findings).and_then(|(header, lines)| {
         let names = header.names.iter().enumerate();
         let meanings: Vec<Option<(&str, Conversion)>> = names.clone().map(|(at, name)| meaning(at, name)).collect();
         let misplaced = meanings.iter().enumerate().find_map(|(at, found)| {
@@ -40,16 +77,10 @@ pub fn parse(text: &str, shown_as: &str) -> Result<Vec<State>, Vec<Diagnostic>> 
             let columns = names.zip(meanings.iter().flatten());
             let columns: Vec<Column> =
                 columns.map(|((at, name), &(_, conversion))| Column { at, name, conversion }).collect();
-            let columns = lines.read(&columns, &mut findings).columns;
-            let count = columns.first().map_or(0, Vec::len);
-            let state = |row: usize| -> State {
-                core::array::from_fn(|part| core::array::from_fn(|axis| columns[6 * part + axis][row]))
-            };
-            return Some((0..count).map(state).collect());
+            return Some(rows_of(&lines.read(&columns, findings).columns));
         };
         findings.refuse(codes::RECORD_HEADER, Some(header.line), wrong, HELP)
-    });
-    findings.conclude(states).map(|(states, _)| states)
+    })
 }
 
 /// Letters between the parts of a name.
@@ -118,6 +149,10 @@ fn place(name: &str) -> Option<usize> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn parse(text: &str, shown_as: &str) -> Result<Vec<State>, Vec<Diagnostic>> {
+        super::parse(text, shown_as, &Reading::default())
+    }
 
     fn row(first: &str) -> String {
         format!("{first}{}", ",0".repeat(17))
@@ -223,6 +258,36 @@ mod tests {
         let [pose, rate, last] = parse(&format!("{usual}\n{units}\n{}\n", ["1"; 18].join(",")), "s.csv").unwrap()[0];
         for (value, expected) in [(pose[0], 1e-3), (pose[3], 1e-3), (rate[5], 1e-3), (last[5], 1.0)] {
             assert!((value / expected - 1.0_f64).abs() < 1e-12, "{value} {expected}");
+        }
+    }
+
+    #[test]
+    fn a_description_gives_columns_in_any_order() {
+        let names = ["x_mm", "y_m", "z_m", "theta_x_deg", "theta_y_rad", "theta_z_rad"];
+        let rates = ["vx_mm/s", "vy_m/s", "vz_m/s", "omega_x_rad/s", "omega_y_rad/s", "omega_z_rad/s"];
+        let last = ["ax_m/s2", "ay_m/s^2", "az_m/s2", "alpha_x_rad/s2", "alpha_y_rad/s2", "alpha_z_rad/s2"];
+        let all = [names, rates, last].concat();
+        let columns: Vec<String> = all.iter().enumerate().map(|(k, name)| format!("{name}={}", 19 - k)).collect();
+        let described = |columns: &str, names: &str| {
+            let reading = Reading::new(&[columns.to_owned()], None).unwrap();
+            let numbers = (1..19).map(|k| k.to_string()).collect::<Vec<_>>().join(",");
+            super::parse(&format!("t,{names}\n0,{numbers}\n"), "s.csv", &reading)
+        };
+        let columns = columns.join(",");
+        let plain = (0..18).map(|k| format!("c{k}")).collect::<Vec<_>>().join(",");
+        let [pose, rate, acceleration] = described(&columns, &plain).unwrap()[0];
+        assert!((pose[0] / 18e-3 - 1.0).abs() < 1e-12 && (rate[0] / 12e-3 - 1.0).abs() < 1e-12, "{pose:?} {rate:?}");
+        assert!((acceleration[5] - 1.0).abs() < 1e-12, "{acceleration:?}");
+        let scaled = columns.replace("vx_mm/s=13", "vx=13*3 mm/s/V+1 m/s");
+        let rate = described(&scaled, &plain).unwrap()[0][1][0];
+        assert!((rate / 1.036 - 1.0).abs() < 1e-12, "{rate}");
+        for (columns, names, words) in [
+            ("x_m=1".to_owned(), plain.clone(), "`--columns` describes no `y_um`"),
+            (columns.clone(), plain.replace("c11", "v (m/s)"), "names `v (m/s)` for `vx_um/s`, but its unit"),
+            (format!("drive_V=1,{columns}"), plain, "names `drive_V`, which this kind of file"),
+        ] {
+            let found = described(&columns, &names).unwrap_err();
+            assert!(found[0].message.contains(words), "{found:?}");
         }
     }
 

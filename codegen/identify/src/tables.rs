@@ -21,8 +21,8 @@ pub(crate) struct Extent {
 pub(crate) struct Choice {
     /// Index of the table.
     pub(crate) table: usize,
-    /// Whether there are other tables.
-    pub(crate) is_one_of: bool,
+    /// Number of tables, if there are several.
+    pub(crate) of: usize,
     /// Number of the stretch, from 1; the longest if none.
     pub(crate) stretch: Option<usize>,
 }
@@ -30,7 +30,7 @@ pub(crate) struct Choice {
 impl Choice {
     /// The value of `--series` that chooses a stretch of the table.
     pub(crate) fn series_of(self, stretch: usize) -> String {
-        if self.is_one_of { format!("{}.{stretch}", self.table + 1) } else { stretch.to_string() }
+        if self.of > 1 { format!("{}.{stretch}", self.table + 1) } else { stretch.to_string() }
     }
 }
 
@@ -66,7 +66,7 @@ pub(crate) fn choose(
     findings: &mut Findings,
 ) -> Option<Choice> {
     let is_one_of = all.len() > 1;
-    let whole = |table| Choice { table, is_one_of, stretch: None };
+    let whole = |table| Choice { table, of: all.len(), stretch: None };
     let words = |but: Option<usize>| -> Vec<String> {
         let others = all.iter().enumerate().filter(|(index, _)| Some(*index) != but);
         others.map(|(index, table)| table.in_words(index)).collect()

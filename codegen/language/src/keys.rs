@@ -104,6 +104,8 @@ pub enum Item {
     File,
     /// A reason: at least two words.
     Reason,
+    /// A description of the columns of a file, as the option `--columns` takes it.
+    Columns,
     /// A name: ASCII letter first, then letters, digits, `-` and `_`, at most [`MAX_NAME`] characters.
     Name,
 }
@@ -185,6 +187,7 @@ impl Item {
             Self::File => "\"<file>\"".to_owned(),
             Self::Name => "\"<name>\"".to_owned(),
             Self::Reason => "\"<reason>\"".to_owned(),
+            Self::Columns => "\"<columns>\"".to_owned(),
         }
     }
 }

@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 use specgen_compiler::{lower, spec_file};
 use specgen_runtime::Motion;
 
-use specgen_identify::states;
+use specgen_identify::{Reading, states};
 use specgen_language::files;
 use specgen_language::model::Model;
 use specgen_language::outcome::{Failure, Outcome, Refusal};
@@ -37,12 +37,13 @@ struct State {
 pub fn run(
     spec: &Path,
     states_file: &Path,
+    reading: &Reading,
     from_rest: bool,
     generated: bool,
     output: Option<&Path>,
     ui: &mut Ui,
 ) -> Result<(), Failure> {
-    let states = read_states(states_file)?;
+    let states = read_states(states_file, reading)?;
     let compiled = spec_file::compiled(spec, ui)?;
     let platform = lower::platform(&compiled.model)
         .map_err(|findings| Refusal { source: Some(compiled.source.clone()), findings })?;
@@ -142,14 +143,15 @@ fn vector(state: &State, result: &Dynamics, rest_lengths: &[f64; 6]) -> Value {
     })
 }
 
-fn read_states(path: &Path) -> Result<Vec<State>, Failure> {
+fn read_states(path: &Path, reading: &Reading) -> Result<Vec<State>, Failure> {
     let shown = path.display();
     let refuse = |text: String| Failure::Gate(format!("{shown}: {text}"));
     let text = files::text_of(path, LARGEST).map_err(|unread| unread_file(path, &unread))?;
     let states = if text.trim_start().starts_with(['{', '[']) {
         from_json(&text).map_err(refuse)?
     } else {
-        let given = states::parse(&text, &shown.to_string()).map_err(|findings| Refusal { source: None, findings })?;
+        let given =
+            states::parse(&text, &shown.to_string(), reading).map_err(|findings| Refusal { source: None, findings })?;
         given.into_iter().enumerate().map(|(k, given)| State { id: k.to_string(), given }).collect()
     };
     if states.is_empty() {

@@ -79,7 +79,7 @@ fn csv(input: &[u8]) {
         assert!(columns.iter().all(|column| column.len() >= 100 && column.iter().all(|value| value.is_finite())));
         assert!(record.time.is_sorted_by(|a, b| a < b));
     }
-    if let Some(table) = accepted(waveform::parse(&text, FILE, 1e-4)) {
+    if let Some(table) = accepted(waveform::parse(&text, FILE, 1e-4, None)) {
         assert!(table.rows.len() >= 2 && table.rows.as_flattened().iter().all(|value| value.is_finite()));
     }
     if let Some(table) = accepted(read_table_csv(&text, FILE)) {

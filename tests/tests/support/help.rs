@@ -80,6 +80,7 @@ fn value(placeholder: &str, item: Option<Item>) -> String {
         // The trajectory of the spec with every key.
         Some(Item::Name) => "circle".to_owned(),
         Some(Item::Reason) => "no stacks are connected".to_owned(),
+        Some(Item::Columns) => "drive_V=2".to_owned(),
         Some(Item::File) | None => "a".to_owned(),
     }
 }

@@ -155,7 +155,7 @@ fn waveforms(source: &SpecSource, model: &Model, table: Option<&str>) -> Vec<Opt
         .map(|trajectory| match &trajectory.kind {
             TrajectoryKind::Waveform { file, period, .. } => {
                 let read = || std::fs::read_to_string(source.dir.join(file)).ok();
-                waveform::parse(&table.map(str::to_owned).or_else(read)?, file, *period).ok()
+                waveform::parse(&table.map(str::to_owned).or_else(read)?, file, *period, None).ok()
             }
             _ => None,
         })

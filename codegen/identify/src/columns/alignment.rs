@@ -2,8 +2,11 @@
 //! another meaning than their places say.
 
 use super::head::{BLANK, Head, Line, decoded, has_fields, is_row, split};
+use super::names::plain;
 use super::number::{clock, is_date, number};
 
+/// How names of columns begin that may have no values.
+const REMARKS: [&str; 8] = ["comment", "remark", "note", "event", "marker", "flag", "start", "increment"];
 /// Rows that are checked for decimal commas.
 const ROWS: usize = 10;
 
@@ -43,11 +46,17 @@ impl Head {
     }
 
     /// Takes the names as not given if they are not above the fields of the first of the `lines`: as of R, which does not
-    /// name the column of row names, or with blanks within them.
+    /// name the column of row names, or with blanks or commas within them. No row then has a field for the last name.
     pub(super) fn drop_unfit_names(&mut self, lines: &[Line]) {
-        let row = lines.iter().find(|(_, line)| has_fields(line)).map(|(_, line)| split(line, self.separator));
-        let Some(fields) = row.filter(|_| !self.names.is_empty()) else { return };
-        if misaligned(&fields, self.names.len(), self.separator).is_some() {
+        let mut rows = lines.iter().filter(|(_, line)| has_fields(line)).map(|(_, line)| split(line, self.separator));
+        let Some(fields) = rows.next().filter(|_| !self.names.is_empty()) else { return };
+        let is_remark = |name: &String| {
+            let name = plain(name);
+            name.is_empty() || REMARKS.iter().any(|begin| name.starts_with(begin))
+        };
+        let longest = rows.fold(fields.len(), |longest, row| if row.len() > longest { row.len() } else { longest });
+        let has_more_names = !self.names.iter().skip(longest).all(is_remark);
+        if has_more_names || misaligned(&fields, self.names.len(), self.separator).is_some() {
             self.unfit = Some([self.names.len(), fields.len()]);
             self.names.clear();
         }

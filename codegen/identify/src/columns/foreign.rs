@@ -54,6 +54,8 @@ fn kind(first: &[u8]) -> Option<(&'static str, &'static str)> {
         [0..=52, 0, 0, 0, _, _, _, 0, 1..=255, _, _, 0, 0 | 1, 0, 0, 0, _, 0, 0, 0, ..] => {
             Some(("a MAT-file of version 4", "save it again with `save('record.mat', '-v7')`"))
         }
+        // Of several channels.
+        _ if first.starts_with(b"Record Length,Analog") => None,
         _ => KNOWN.iter().find(|(bytes, ..)| first.starts_with(bytes)).map(|(_, what, help)| (*what, *help)),
     }
 }

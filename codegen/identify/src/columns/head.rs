@@ -61,6 +61,15 @@ pub(super) fn find(lines: &[Line], preamble: bool) -> Option<Head> {
     if let Some(at) = (first..lines.len()).find(|&at| is_above(at) && known(at) > 1) {
         return Some(at_line(lines, at, interval));
     }
+    if let Some(row) = row
+        && let Some(separator) = separator_of(&lines[row].1)
+    {
+        // `# NAME0 = …` of the General Command Set.
+        let names: Vec<String> = lines[..row].iter().filter_map(|(_, line)| numbered_name(line)).collect();
+        if names.len() > 1 && names.len() == split(&lines[row].1, separator).len() {
+            return Some(Head { names, next: row, interval, ..Head::without_names(lines[row].0, separator) });
+        }
+    }
     let above = |row: usize, fits: &dyn Fn(&[u8]) -> bool| (0..row).rev().find(|&at| fits(&lines[at].1));
     match row {
         // Some programs write the names into the last comment.
@@ -81,8 +90,26 @@ pub(super) fn find(lines: &[Line], preamble: bool) -> Option<Head> {
             let is_text = |line: &[u8]| has_fields(line) && !is_units(line) && !is_rule(line) && !has_number(line);
             Some(at_line(lines, above(row, &is_text).unwrap_or(first), interval))
         }
-        None => Some(at_line(lines, first, interval)),
+        // A single column has no separator.
+        None => {
+            let is_number = |line: &[u8]| has_fields(line) && number(&decoded(line.trim_ascii()), BLANK).is_some();
+            let names = lines.iter().position(|(_, line)| is_number(line)).filter(|row| *row > first);
+            let names = names.and_then(|row| above(row, &|line| has_fields(line) && !is_unit_line(line)));
+            Some(at_line(lines, names.unwrap_or(first), interval))
+        }
     }
+}
+
+/// Whether a line is only a unit, such as `[um]`.
+fn is_unit_line(line: &[u8]) -> bool {
+    names::is_unit(decoded(line).trim())
+}
+
+/// The name in a comment such as `# NAME0 = Current Position`.
+fn numbered_name(line: &[u8]) -> Option<String> {
+    let text = decoded(uncommented(line));
+    let (number, name) = text.trim().strip_prefix("NAME").filter(|_| is_comment(line))?.split_once('=')?;
+    number.trim().parse::<u8>().ok().map(|_| name.trim().to_owned())
 }
 
 fn at_line(lines: &[Line], at: usize, interval: Option<f64>) -> Head {
@@ -91,11 +118,8 @@ fn at_line(lines: &[Line], at: usize, interval: Option<f64>) -> Head {
     let separator = rows.map_or_else(|| of_names(text), |(separator, _)| separator);
     let count = rows.map(|(separator, row)| split(row, separator).len());
     let mut names = fitting_names(text, count.filter(|_| matches!(separator, BLANK | b'\t')));
-    if Some(names.len()) == count.map(|count| 2 * count)
-        && names[1..].iter().step_by(2).all(|unit| names::is_unit(unit))
-    {
-        // `Time,s,Ch1,V` above columns that commas separate.
-        names = names.chunks(2).map(|pair| pair.join(",")).collect();
+    if let Some(joined) = count.filter(|count| names.len() > *count).and_then(|count| with_commas(&names, count)) {
+        names = joined;
     }
     let mut head = Head { names, next: at + 1, interval, ..Head::without_names(*line, separator) };
     head.skip_rule(lines);
@@ -132,6 +156,24 @@ fn fitting_names(line: &[u8], count: Option<usize>) -> Vec<String> {
     let of_gaps = text.replace('\t', "  ");
     let of_gaps = of_gaps.split("  ").map(str::trim).filter(|name| !name.is_empty()).map(str::to_owned).collect();
     [of_words, of_gaps].into_iter().find(|other: &Vec<String>| Some(other.len()) == count).unwrap_or(names)
+}
+
+/// `count` names, of which commas divide some: within brackets, or before the unit, as in `Time,s,Ch1,V`.
+fn with_commas(names: &[String], count: usize) -> Option<Vec<String>> {
+    let join = |names: &[String], between: &str, is_joined: &dyn Fn(&str, &str) -> bool| {
+        let mut joined: Vec<String> = Vec::new();
+        for name in names {
+            match joined.last_mut() {
+                Some(last) if is_joined(last, name) => *last = format!("{last}{between}{name}"),
+                _ => joined.push(name.clone()),
+            }
+        }
+        joined
+    };
+    let is_open = |name: &str, _: &str| name.matches(['(', '[']).count() > name.matches([')', ']']).count();
+    let closed = join(names, ", ", &is_open);
+    let with_units = join(&closed, ",", &|name, next| names::is_unit(next) && !name.contains(','));
+    [closed, with_units].into_iter().find(|names| names.len() == count)
 }
 
 /// Whether a line below `Start,Increment` has units, start and increment, as `Sequence,Volt,0,1e-3`.
@@ -205,8 +247,7 @@ fn interval(line: &[u8]) -> Option<f64> {
     };
     let unit = unit.map(|unit| unit.trim_matches(['[', ']', '(', ')']));
     let per = match unit.filter(|unit| unit.starts_with(char::is_alphabetic)) {
-        // `nsec` is `ns`.
-        Some(unit) => names::quantity("time_s")?.per(unit.strip_suffix("ec").unwrap_or(unit))?,
+        Some(unit) => names::quantity("time_s")?.per(unit)?,
         None => 1.0,
     };
     number.parse().ok().map(|step: f64| step / per).filter(is_interval)
@@ -379,9 +420,11 @@ mod tests {
             ("a;b\ns;V\n0;1\n", 1, &["a [s]", "b [V]"], b';'),
             ("Time,s;Ch1,V\n0;1\n", 1, &["Time,s", "Ch1,V"], b';'),
             ("Time,s,Ch1,V\n0,1\n", 1, &["Time,s", "Ch1,V"], b','),
+            ("t,s,F (N, mean),y,um\n0,1,2\n", 1, &["t,s", "F (N, mean)", "y,um"], b','),
             ("# time_s drive_V\n0.1 2\n", 1, &["time_s", "drive_V"], b' '),
             ("0;1\n2;3\n", 1, &[], b';'),
             ("0;1\n# time_s;drive_V\n2;3\n", 1, &[], b';'),
+            ("DRR? 1 2\n# DIM = 2\n# NAME0 = a b\n# NAME1 = c\n1 2\n", 5, &["a b", "c"], b' '),
             ("bench\n# time_s;drive_V\n2;3\n", 2, &["time_s", "drive_V"], b';'),
             ("drve_V,t_s\nx,1\n0,1\n", 1, &["drve_V", "t_s"], b','),
             ("time_s;drive_V\n", 1, &["time_s", "drive_V"], b';'),
@@ -400,6 +443,8 @@ mod tests {
             ("Sample Interval;2,000E-06", Some(2e-6)),
             ("Sample Interval: 1  [ms]", Some(1e-3)),
             ("Sample Interval: 1000000 nsec", Some(1e-3)),
+            ("Sample Interval: 1000 microsec", Some(1e-3)),
+            ("Sample Interval: 1e9 ps", Some(1e-3)),
             ("Sample Interval: 1000 fortnights", None),
             ("Sample Interval,1e-3,ticks", None),
             ("Sample Interval: 1,000 us", None),

@@ -8,6 +8,19 @@ pub(crate) struct Quantity {
     /// Other names, in lower case letters and digits.
     also: &'static [&'static str],
     units: &'static [Unit],
+    /// What follows a unit: nothing, or one of [`PER_TIME`].
+    per_time: &'static [&'static str],
+}
+
+impl Quantity {
+    const fn new(name: &'static str, also: &'static [&'static str], units: &'static [Unit]) -> Self {
+        Self { name, also, units, per_time: &[""] }
+    }
+
+    /// A rate (1), or an acceleration (2).
+    const fn rate(order: usize, name: &'static str, also: &'static [&'static str], units: &'static [Unit]) -> Self {
+        Self { name, also, units, per_time: PER_TIME[order - 1] }
+    }
 }
 
 /// Name of a unit, and its number in one unit of [`Quantity::name`].
@@ -26,6 +39,11 @@ impl Conversion {
     /// From a unit of which `per` are one of the quantity's.
     pub(crate) const fn unit(per: f64) -> Self {
         Self { per, scale: None }
+    }
+
+    /// The same to a unit of which one is `per` of the quantity's.
+    pub(crate) fn per(self, per: f64) -> Self {
+        Self { per: self.per * per, scale: self.scale.map(|[factor, offset]| [factor, offset / per]) }
     }
 
     /// The value in units of the quantity.
@@ -72,24 +90,45 @@ const KINDS: [&[Unit]; 5] = [TIME, VOLTAGE, LENGTH, FORCE, ANGLE];
 
 /// Every quantity of a record.
 pub(crate) static QUANTITIES: [Quantity; 7] = [
-    Quantity { name: "time_s", also: &["t", "zeit"], units: TIME },
-    Quantity { name: "drive_V", also: &["command"], units: VOLTAGE },
-    Quantity { name: "monitor_V", also: &[], units: VOLTAGE },
-    Quantity { name: "displacement_um", also: &["position", "disp", "auslenkung"], units: LENGTH },
-    Quantity { name: "force_N", also: &["kraft"], units: FORCE },
-    Quantity { name: "gauge_V", also: &[], units: VOLTAGE },
-    Quantity { name: "reference_um", also: &["ref"], units: LENGTH },
+    Quantity::new("time_s", &["t", "zeit"], TIME),
+    Quantity::new("drive_V", &["command"], VOLTAGE),
+    Quantity::new("monitor_V", &[], VOLTAGE),
+    Quantity::new("displacement_um", &["position", "disp", "auslenkung"], LENGTH),
+    Quantity::new("force_N", &["kraft"], FORCE),
+    Quantity::new("gauge_V", &[], VOLTAGE),
+    Quantity::new("reference_um", &["ref"], LENGTH),
 ];
 
 /// The coordinates of a pose, in the order of a row.
 pub(crate) static COORDINATES: [Quantity; 6] = [
-    Quantity { name: "x_um", also: &[], units: LENGTH },
-    Quantity { name: "y_um", also: &[], units: LENGTH },
-    Quantity { name: "z_um", also: &[], units: LENGTH },
-    Quantity { name: "theta_x_urad", also: &["thetax", "rx", "θx"], units: ANGLE },
-    Quantity { name: "theta_y_urad", also: &["thetay", "ry", "θy"], units: ANGLE },
-    Quantity { name: "theta_z_urad", also: &["thetaz", "rz", "θz"], units: ANGLE },
+    Quantity::new("x_um", &[], LENGTH),
+    Quantity::new("y_um", &[], LENGTH),
+    Quantity::new("z_um", &[], LENGTH),
+    Quantity::new("theta_x_urad", &["rx", "θx"], ANGLE),
+    Quantity::new("theta_y_urad", &["ry", "θy"], ANGLE),
+    Quantity::new("theta_z_urad", &["rz", "θz"], ANGLE),
 ];
+
+/// Their rates, then their accelerations.
+pub(crate) static RATES: [Quantity; 12] = [
+    Quantity::rate(1, "vx_um/s", &["xdot"], LENGTH),
+    Quantity::rate(1, "vy_um/s", &["ydot"], LENGTH),
+    Quantity::rate(1, "vz_um/s", &["zdot"], LENGTH),
+    Quantity::rate(1, "omega_x_urad/s", &["wx", "ωx", "rxdot"], ANGLE),
+    Quantity::rate(1, "omega_y_urad/s", &["wy", "ωy", "rydot"], ANGLE),
+    Quantity::rate(1, "omega_z_urad/s", &["wz", "ωz", "rzdot"], ANGLE),
+    Quantity::rate(2, "ax_um/s2", &["xddot"], LENGTH),
+    Quantity::rate(2, "ay_um/s2", &["yddot"], LENGTH),
+    Quantity::rate(2, "az_um/s2", &["zddot"], LENGTH),
+    Quantity::rate(2, "alpha_x_urad/s2", &["αx", "rxddot"], ANGLE),
+    Quantity::rate(2, "alpha_y_urad/s2", &["αy", "ryddot"], ANGLE),
+    Quantity::rate(2, "alpha_z_urad/s2", &["αz", "rzddot"], ANGLE),
+];
+
+/// Every quantity that a column may hold.
+pub(crate) fn all() -> impl Iterator<Item = &'static Quantity> {
+    QUANTITIES.iter().chain(&COORDINATES).chain(&RATES)
+}
 
 /// Words of headers for a quantity, in lower case: those of up to three letters alone, longer ones also as part of another.
 const WORDS: [(&str, &[&str]); 4] = [
@@ -106,7 +145,7 @@ const X_VALUE: &str = "xvalue";
 
 /// The quantity of a column such as `time_s`.
 pub(crate) fn quantity(name: &str) -> Option<&'static Quantity> {
-    QUANTITIES.iter().find(|quantity| quantity.name == name)
+    all().find(|quantity| quantity.name == name)
 }
 
 /// Quality of a match between header and quantity, the best first.
@@ -127,13 +166,12 @@ impl Quantity {
         if header.starts_with(MINUS) {
             return None;
         }
-        let (name, unit) = parts(header);
         if self.name == "time_s" && plain(header) == X_VALUE {
             return Some((Fit::OtherName, 1.0));
         }
-        let per = self.per(&unit?)?;
+        let (name, per) = self.divided(header)?;
         match name.as_str() {
-            name if name == self.plain() => Some((Fit::OtherUnit, per)),
+            name if name == plain(self.plain()) => Some((Fit::OtherUnit, per)),
             name if self.also.contains(&name) && !ends_with_word(header) => Some((Fit::OtherName, per)),
             _ => None,
         }
@@ -141,13 +179,24 @@ impl Quantity {
 
     /// Number of `text`, a unit, in one of our units.
     pub(crate) fn per(&self, text: &str) -> Option<f64> {
-        per(self.units, &unit(text))
+        self.per_time.iter().find_map(|ending| per(self.units, &unit(text.trim().strip_suffix(ending)?)))
     }
 
     /// The same for a name such as `drive_mV`; `None` if that is another quantity, or has no unit of it.
     pub(crate) fn per_of(&self, name: &str) -> Option<f64> {
-        let (quantity, unit) = parts(name);
-        if quantity == self.plain() { self.per(&unit?) } else { None }
+        self.divided(name).filter(|(quantity, _)| *quantity == plain(self.plain())).map(|(_, per)| per)
+    }
+
+    /// The name in a header, and its units in one of ours; none if it has no unit of this quantity.
+    pub(crate) fn divided(&self, header: &str) -> Option<(String, f64)> {
+        self.per_time.iter().find_map(|ending| {
+            // `vx_mm/s`, or `vx (mm/s)`.
+            let bare = header.trim().strip_suffix(ending);
+            let (name, unit) = parts(bare.unwrap_or(header));
+            let unit = unit?;
+            let unit = if bare.is_some() { &unit } else { unit.strip_suffix(ending)? };
+            Some((name, per(self.units, unit)?))
+        })
     }
 
     /// Its name without the unit.
@@ -181,12 +230,12 @@ impl Quantity {
 
     /// Its unit.
     pub(crate) fn unit(&self) -> &'static str {
-        self.units[0].0
+        self.name.rsplit_once('_').map_or("", |(_, unit)| unit)
     }
 
     /// Its names with the units that are accepted.
     pub(crate) fn all_names(&self) -> String {
-        let name = |(unit, _): &Unit| format!("`{}_{unit}`", self.plain());
+        let name = |(unit, _): &Unit| format!("`{}_{unit}{}`", self.plain(), self.per_time[0]);
         self.units.iter().map(name).collect::<Vec<_>>().join(", ")
     }
 }
@@ -279,7 +328,7 @@ pub(crate) fn unit_in_brackets(header: &str) -> Option<String> {
 
 /// Whether a header names sample numbers.
 pub(crate) fn is_sample_number(header: &str) -> bool {
-    SAMPLE.contains(&plain(header).as_str())
+    !header.starts_with('(') && SAMPLE.contains(&plain(header).as_str())
 }
 
 /// Whether a header names a quantity or a coordinate with its unit.
@@ -306,14 +355,20 @@ pub(crate) fn is_known(header: &str) -> bool {
 
 /// Whether a field of a line below the names is a unit, or one per s or s².
 pub(crate) fn is_unit(field: &str) -> bool {
-    let unit = field.trim_matches(['[', ']', '(', ')']);
+    let unit = field.trim_matches(['[', ']', '(', ')']).trim();
     let is_known = |unit: &str| QUANTITIES.iter().chain(&COORDINATES).any(|quantity| quantity.per(unit).is_some());
     let mut endings = PER_TIME.iter().flat_map(|endings| *endings);
     is_known(unit) || endings.any(|ending| unit.strip_suffix(ending).is_some_and(is_known))
 }
 
+/// Whether a header ends with a unit per s or s² in brackets.
+pub(crate) fn is_rate(header: &str) -> bool {
+    let is_known = |unit: &str| PER_TIME.iter().flat_map(|endings| *endings).any(|ending| unit.ends_with(ending));
+    unit_in_brackets(header).is_some_and(|unit| is_known(&unit) && is_unit(&unit))
+}
+
 /// What follows the unit of a rate, and that of an acceleration.
-pub(crate) const PER_TIME: [&[&str]; 2] = [&["/s"], &["/s^2", "/s2", "/s²", "/s/s"]];
+pub(crate) const PER_TIME: [&[&str]; 2] = [&["/s"], &["/s2", "/s^2", "/s²", "/s/s"]];
 
 /// Lower case letters and digits of a name.
 pub(crate) fn plain(name: &str) -> String {
@@ -340,8 +395,10 @@ const MEGA: [&str; 4] = ["MN", "Mm", "Ms", "Mrad"];
 /// Most letters of a unit that is not known; longer texts in brackets are remarks, unless they are one of the next words.
 const UNKNOWN: usize = 4;
 /// Units of no quantity here, in or without brackets.
-const FOREIGN: [&str; 12] =
-    ["counts", "count", "ticks", "steps", "digits", "lsb", "percent", "%", "ft", "rpm", "mdeg", "oe"];
+const FOREIGN: [&str; 15] = [
+    "counts", "count", "ticks", "steps", "digits", "digit", "code", "codes", "lsb", "percent", "%", "ft", "rpm",
+    "mdeg", "oe",
+];
 /// Remarks in brackets that are as short as units.
 const REMARKS: [&str; 9] = ["act", "raw", "avg", "mean", "set", "cmd", "ref", "ist", "soll"];
 /// Letters of channels, before a number.
@@ -357,8 +414,10 @@ fn unit(given: &str) -> String {
         "mn" | "mm" | "ms" | "mrad" if MEGA.contains(&given.trim()) => given.trim().to_owned(),
         "volt" | "volts" => "v".to_owned(),
         "sec" | "secs" | "second" | "seconds" => "s".to_owned(),
-        "msec" | "millisecond" | "milliseconds" => "ms".to_owned(),
+        "msec" | "millisec" | "millisecond" | "milliseconds" => "ms".to_owned(),
         "usec" | "microsec" | "microsecond" | "microseconds" => "us".to_owned(),
+        "nsec" | "nanosec" | "nanosecond" | "nanoseconds" => "ns".to_owned(),
+        "psec" | "picosec" | "picosecond" | "picoseconds" => "ps".to_owned(),
         "minute" | "minutes" => "min".to_owned(),
         "hr" | "hrs" | "hour" | "hours" => "h".to_owned(),
         "day" | "days" => "d".to_owned(),
@@ -481,12 +540,22 @@ mod tests {
             ("x (um)", 0, Some((Fit::OtherUnit, 1.0))),
             ("X_MM", 0, Some((Fit::OtherUnit, 1e-3))),
             ("rx [mrad]", 3, Some((Fit::OtherName, 1e-3))),
-            ("theta_z_rad", 5, Some((Fit::OtherName, 1e-6))),
+            ("theta_z_rad", 5, Some((Fit::OtherUnit, 1e-6))),
             ("theta_x", 3, None),
             ("rx", 3, None),
         ] {
             assert_eq!(COORDINATES[at].fits(header), expected, "{header}");
             assert_eq!(COORDINATES[at].is_named(header), expected.is_none(), "{header}");
+        }
+        for (header, at, per) in [
+            ("vx [mm/s]", 0, 1e-3),
+            ("Xdot, m/s", 0, 1e-6),
+            ("wz (rad/s)", 5, 1e-6),
+            ("az_um/s^2", 8, 1.0),
+            ("alpha_x_mrad/s/s", 9, 1e-3),
+        ] {
+            assert_eq!(RATES[at].fits(header).map(|(_, per)| per), Some(per), "{header}");
+            assert_eq!(RATES.iter().filter(|rate| rate.fits(header).is_some()).count(), 1, "{header}");
         }
         let (_, per) = COORDINATES[4].fits("Ry deg").unwrap();
         assert!((Conversion::unit(per).apply(180.0) * 1e-6 - core::f64::consts::PI).abs() < 1e-12, "{per}");

@@ -29,6 +29,14 @@ pub(super) fn number(field: &str, separator: u8) -> Option<(f64, Option<char>)> 
     field.replace(',', ".").parse().ok().map(|value| (value, Some(',')))
 }
 
+/// Whether a text is a number with signs between thousands, such as `1,234.5`.
+pub(super) fn is_grouped(text: &str) -> bool {
+    let digits = text.trim_start_matches(['+', '-']);
+    let parts: Vec<&str> = digits.split([',', '.', '\'', '\u{2019}', ' ', '\u{a0}', '\u{202f}']).collect();
+    let is_digits = parts.iter().all(|part| !part.is_empty() && part.bytes().all(|byte| byte.is_ascii_digit()));
+    is_digits && parts[0].len() < 4 && parts.get(1).is_some_and(|part| part.len() == 3)
+}
+
 /// A time of day.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Clock {
@@ -94,8 +102,15 @@ fn is_next_day(date: &str, before: &str) -> bool {
 }
 
 fn parts(date: &str) -> Option<[i32; 3]> {
-    let parts: Option<Vec<i32>> = date.split(['-', '/', '.']).map(|part| part.trim().parse().ok()).collect();
+    let number = |(at, part): (usize, &str)| part.trim().parse().ok().or_else(|| month(part).filter(|_| at == 1));
+    let parts: Option<Vec<i32>> = date.split(['-', '/', '.', ' ']).enumerate().map(number).collect();
     parts?.try_into().ok()
+}
+
+/// Number of a month such as `Mar`.
+fn month(text: &str) -> Option<i32> {
+    let found = "janfebmaraprmayjunjulaugsepoctnovdec".find(&text.to_ascii_lowercase()).filter(|_| text.len() == 3)?;
+    i32::try_from(found / 3 + 1).ok().filter(|_| found % 3 == 0)
 }
 
 /// Number of a day of a year and a month.
@@ -150,10 +165,12 @@ impl Clock {
 /// A day, s.
 const DAY: f64 = 86_400.0;
 
-/// Whether a field is a date such as `2024-03-05` or `5.3.2024`.
+/// Whether a field is a date such as `2024-03-05`, `5.3.2024` or `5-Mar-2024`.
 pub(super) fn is_date(field: &[u8]) -> bool {
     let parts: Vec<&[u8]> = field.split(|byte| matches!(byte, b'-' | b'/' | b'.')).collect();
-    parts.len() == 3 && parts.iter().all(|part| !part.is_empty() && part.iter().all(u8::is_ascii_digit))
+    let is_month = |part: &[u8]| std::str::from_utf8(part).is_ok_and(|text| month(text).is_some());
+    let is_number = |part: &[u8]| !part.is_empty() && part.iter().all(u8::is_ascii_digit);
+    parts.len() == 3 && parts.iter().enumerate().all(|(at, part)| is_number(part) || at == 1 && is_month(part))
 }
 
 #[cfg(test)]
@@ -181,11 +198,13 @@ mod tests {
             ("31/12/2024 23:59:59", "1/1/2025 0:00:01", Some(2.0)),
             ("04.03.24 23:59:59", "05.03.24 0:00:01", Some(2.0)),
             ("3/4/2024 23:59:59", "3/7/2024 0:00:01", None),
-            ("4-Mar-2024 23:59:59", "7-Mar-2024 0:00:01", None),
+            ("4-Mar-2024 23:59:59", "7-Mar-2024 0:00:01", Some(2.0 * DAY + 2.0)),
+            ("28 Feb 2024 23:59:59", "01 Mar 2024 0:00:01", Some(DAY + 2.0)),
+            ("Mar-4-2024 23:59:59", "Mar-5-2024 0:00:01", None),
             ("3/4/2024 23:59:59", "3/4/2024 0:00:01", Some(2.0 - DAY)),
             ("3/4/2024 10:00:00", "3/4/2024 10:00:02", Some(2.0)),
             ("3/4/2024 10:00:00", "3/5/2024 10:00:02", None),
-            ("4-Mar-2024 10:00:00", "5-Mar-2024 10:00:02", None),
+            ("4-Mrz-2024 10:00:00", "5-Mrz-2024 10:00:02", None),
             ("2024-03-31T01:59:59+01:00", "2024-03-31T03:00:01+02:00", None),
             ("2024-03-31T01:59:59+01:00", "2024-03-31T02:00:01+01:00", Some(2.0)),
         ] {
@@ -209,6 +228,8 @@ mod tests {
             assert_eq!(number(text, b',').map(|(value, _)| value), Some(value), "{text}");
         }
         assert!(number("9.91E+37", b',').is_some_and(|(value, _)| value.is_infinite()));
+        assert!(["1,234.5", "-1.234,5", "1'234", "1\u{202f}234.5", "12 345"].iter().all(|text| is_grouped(text)));
+        assert!(!["1.5", "1234,567", "5.3.2024", "", "1.", "10:11", "a,234"].iter().any(|text| is_grouped(text)));
         for bad in ["\u{2013}", "1\u{2013}2", "0x1f", "1'234.5", "1 234", "1.234.567", "1\u{202f}234", "5 %"] {
             assert_eq!(number(bad, b';'), None, "{bad}");
         }
@@ -233,6 +254,7 @@ mod tests {
         let days = ["2024-02-28", "29.2.2024", "2024/03/01"].map(|date| clock(&format!("{date} 0:00:00")).unwrap().day);
         assert_eq!(days.map(|day| day.unwrap() - days[0].unwrap()), [0, 1, 2]);
         assert_eq!(clock("3/5/2024 0:00:00").unwrap().day, None);
+        assert!(is_date(b"5-Mar-2024") && !is_date(b"Mar-5-2024") && !is_date(b"5-anf-2024"));
         assert!(is_date(b"2024-03-05") && is_date(b"5.3.2024") && !is_date(b"1-2") && !is_date(b"1.2.x"));
     }
 }

@@ -4,7 +4,7 @@ use std::io::Read;
 
 use super::head::{self, Line, decoded, has_fields, is_row, is_rule, names_of, separator_of, split};
 use super::lines::LineReader;
-use super::number::number;
+use super::number::{is_grouped, number};
 use crate::tables::Extent;
 use specgen_language::interrupt;
 
@@ -19,13 +19,15 @@ pub(crate) struct Part {
     pub(crate) rows: usize,
     /// Parts between blank lines in which the first column always changes in the same direction; 0 if any does not.
     pub(crate) curves: usize,
+    /// Rises of the first column, or falls, if between all of them it goes back in one step, without a blank line.
+    pub(crate) sweeps: usize,
     /// Number of the lines behind the last table that look like rows, and the first of them.
     pub(crate) behind: (usize, usize),
 }
 
 impl Part {
     /// A text that is not divided.
-    pub(crate) const WHOLE: Self = Self { from: 1, last: None, rows: 0, curves: 0, behind: (0, 0) };
+    pub(crate) const WHOLE: Self = Self { from: 1, last: None, rows: 0, curves: 0, sweeps: 0, behind: (0, 0) };
 }
 
 /// Most tables of a text.
@@ -43,6 +45,43 @@ struct Open {
     curve: Curve,
     /// Curves with a rising and with a falling first column, and others.
     curves: [usize; 3],
+    sweeps: Sweeps,
+}
+
+/// Runs of the first column in one direction.
+#[derive(Default)]
+struct Sweeps {
+    rises: Option<bool>,
+    /// First value of the last run, and steps in it.
+    start: f64,
+    steps: usize,
+    /// Steps back.
+    back: usize,
+    /// Whether it turned, did not change, or began again with the same value, as times do.
+    others: bool,
+}
+
+impl Sweeps {
+    fn add(&mut self, last: f64, value: f64) {
+        let step = value - last;
+        if self.rises.is_none() {
+            self.start = last;
+        }
+        let rises = *self.rises.get_or_insert(step > 0.0);
+        if step != 0.0 && (step > 0.0) == rises {
+            self.steps += 1;
+        } else {
+            // A curve has several rows.
+            self.others |= step == 0.0 || self.steps + 1 < CURVE || value == self.start;
+            self.start = value;
+            self.back += 1;
+            self.steps = 0;
+        }
+    }
+
+    fn count(&self) -> usize {
+        if self.others || self.back == 0 { 0 } else { self.back + 1 }
+    }
 }
 
 /// Rows since the last blank line.
@@ -105,7 +144,10 @@ pub(crate) fn tables(source: impl Read) -> Vec<(Part, Extent)> {
 /// Whether a line is about the rows below it, or ends the table, and is not a row with a mistake: that has a number, and
 /// behind a blank line it begins with one.
 fn is_text(line: &[u8], separator: u8, is_behind_blank: bool) -> bool {
-    let is_number = |field: &&[u8]| number(&decoded(field), separator).is_some();
+    let is_number = |field: &&[u8]| {
+        let text = decoded(field);
+        number(&text, separator).is_some() || is_grouped(&text)
+    };
     let fields = split(line, separator);
     let count = if is_behind_blank { 1 } else { fields.len() };
     !fields.iter().take(count).any(is_number)
@@ -126,6 +168,7 @@ impl Open {
             last: first,
             curve: Curve::default(),
             curves: [0; 3],
+            sweeps: Sweeps::default(),
         };
         table.add(first, row);
         table
@@ -158,6 +201,9 @@ impl Open {
         // Without a blank line there is one curve, whatever its direction.
         let first = split(line, self.separator).first().and_then(|field| number(&decoded(field), self.separator));
         if let Some((value, _)) = first {
+            if self.extent.rows > 1 {
+                self.sweeps.add(self.curve.last, value);
+            }
             if self.curve.rows > 1 {
                 let step = usize::from(value <= self.curve.last) + usize::from(value == self.curve.last);
                 self.curve.steps[step] = true;
@@ -167,7 +213,8 @@ impl Open {
     }
 
     fn end_curve(&mut self) {
-        let Curve { rows, steps, .. } = std::mem::take(&mut self.curve);
+        let Curve { rows, steps, last } = std::mem::take(&mut self.curve);
+        self.curve.last = last;
         match steps {
             _ if rows < CURVE => {}
             [true, false, false] => self.curves[0] += 1,
@@ -183,7 +230,10 @@ impl Open {
             _ => 0,
         };
         let rows = self.extent.rows;
-        (Part { last: (!is_last).then_some(self.last), rows, curves, ..self.part }, self.extent)
+        (
+            Part { last: (!is_last).then_some(self.last), rows, curves, sweeps: self.sweeps.count(), ..self.part },
+            self.extent,
+        )
     }
 }
 
@@ -240,6 +290,12 @@ mod tests {
         let rises = [curve(0, 1), curve(-1, 1), curve(-2, 1)];
         assert_eq!(curves(&rises.join("\n")), 3);
         assert_eq!(curves(&rises.concat()), 0);
+        let sweeps = |text: &str| tables(text.as_bytes())[0].0.sweeps;
+        assert_eq!([sweeps(&rises.concat()), sweeps(&curve(0, 1))], [3, 0]);
+        // A drive that returns or rests, and times.
+        assert_eq!(sweeps(&[curve(0, 1), curve(4, -1), curve(0, 1)].concat()), 0);
+        assert_eq!(sweeps(&format!("{}4,4\n{}", curve(0, 1), curve(0, 1))), 0);
+        assert_eq!(sweeps(&curve(0, 1).repeat(3)), 0);
         assert_eq!(curves(&[curve(0, 1), curve(4, -1), curve(0, 1)].join("\n")), 0);
         // A point between the curves, as magnetometers record their drift.
         assert_eq!(curves(&rises.join("\n9,0\n\n")), 3);

@@ -66,16 +66,20 @@ impl Signs {
         }
     }
 
-    /// Column, line and text of a number whose sign may divide thousands. A point does so where semicolons separate the
-    /// columns. There the numbers below 1000 have no sign.
-    pub(super) fn doubt(&self) -> Option<(usize, usize, &str)> {
-        let is_point = self.sign.filter(|_| !self.is_decimal && !self.is_undivided)? == '.';
-        let has_semicolons = self.separator == b';';
-        if is_point && !has_semicolons || !is_point && self.has_comma_clock {
+    /// Column, line and text of a number whose sign may divide thousands, and whether that is likely: then the numbers below
+    /// 1000 have no sign, or it is a comma where nothing shows decimal commas. Between commas a point divides nothing.
+    pub(super) fn doubt(&self) -> Option<(usize, usize, &str, bool)> {
+        let is_comma = self.sign.filter(|_| !self.is_decimal && !self.is_undivided)? == ',';
+        if is_comma && self.has_comma_clock || !is_comma && self.separator == b',' {
             return None;
         }
-        let mut columns = self.columns.iter().enumerate().filter(|(_, seen)| !has_semicolons || seen.has_whole);
-        columns.find_map(|(at, seen)| seen.doubtful.as_ref().map(|(line, text)| (at, *line, text.as_str())))
+        let all = || {
+            self.columns.iter().enumerate().filter_map(|(at, seen)| {
+                let (line, text) = seen.doubtful.as_ref()?;
+                Some((at, *line, text.as_str(), seen.has_whole || is_comma && self.separator != b';'))
+            })
+        };
+        all().find(|(.., is_likely)| *is_likely).or_else(|| all().next())
     }
 }
 
@@ -87,15 +91,19 @@ mod tests {
     fn a_sign_divides_thousands_unless_a_field_shows_that_it_does_not() {
         for (separator, rows, doubt) in [
             (b';', &["10:00:00,100;5,000", "10:00:00,200;20,000"][..], None),
-            (b';', &["0;5,000", "1;20,000"], None),
-            (b';', &["0;999", "1;20,000"], Some("20,000")),
+            (b';', &["0;5,000", "1;20,000"], Some(("5,000", false))),
+            (b';', &["0;999", "1;20,000"], Some(("20,000", true))),
             (b';', &["10:00:00,100;999", "10:00:00,200;20,000"], None),
-            (b';', &["10:00:00,100;999", "10:00:00,200;20.000"], Some("20.000")),
-            (b'\t', &["0\t5,000", "1\t20,000"], Some("5,000")),
+            (b';', &["10:00:00,100;999", "10:00:00,200;20.000"], Some(("20.000", true))),
+            (b'\t', &["0\t5,000", "1\t20,000"], Some(("5,000", true))),
             (b'\t', &["1000\t7", "1001\t20,000"], None),
             (b'\t', &["-1000\t7", "1\t20,000"], None),
-            (b'\t', &["0,5\t7", "1\t20,000"], Some("20,000")),
+            (b'\t', &["0,5\t7", "1\t20,000"], Some(("20,000", true))),
             (b'\t', &["0\t20,000", "0,5\t7"], None),
+            (b'\t', &["0\t999", "1\t20.000"], Some(("20.000", true))),
+            (b'\t', &["0\t5.000", "1\t20.000"], Some(("5.000", false))),
+            (b'\t', &["0.000\t999", "0.001\t20.000"], None),
+            (b',', &["0,999", "1,20.000"], None),
         ] {
             let mut signs = Signs::new(separator, 1);
             for (line, row) in rows.iter().enumerate() {
@@ -104,7 +112,7 @@ mod tests {
                 assert!(signs.add(0, line, fields[1], sign), "{row}");
                 signs.look_at(&fields.iter().map(|field| field.as_bytes()).collect::<Vec<_>>());
             }
-            assert_eq!(signs.doubt().map(|(_, _, text)| text), doubt, "{rows:?}");
+            assert_eq!(signs.doubt().map(|(_, _, text, is_likely)| (text, is_likely)), doubt, "{rows:?}");
         }
     }
 }

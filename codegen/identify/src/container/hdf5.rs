@@ -1,13 +1,13 @@
 //! HDF5 files, with those of MATLAB 7.3: the datasets of the file and of its groups.
 
-use hdf5_pure::{AttrValue, DType, Dataset, Error, File, Group};
+use hdf5_pure::{AttrValue, DType, Dataset, Datatype, DatatypeByteOrder, Error, File, Group};
 
-use super::bytes::{LONGEST_NAME, MOST_ARRAYS, Refusal, Space};
+use super::bytes::{Bytes, Form, LONGEST_NAME, MOST_ARRAYS, Refusal, Space};
 use super::{Array, Contents};
 use crate::columns::names::with_unit;
 
-/// Classes of MATLAB that have no numbers, though they are stored as numbers.
-const NO_NUMBERS: [&str; 4] = ["char", "cell", "string", "function_handle"];
+/// How classes of MATLAB begin that are numbers. Others are stored as numbers, too.
+const NUMBERS: [&str; 5] = ["double", "single", "int", "uint", "logical"];
 /// Names of an attribute with the unit of a dataset.
 const UNIT: [&str; 5] = ["unit", "units", "Unit", "Units", "UNIT"];
 /// Levels of groups that are read, and number of groups: links may make a circle.
@@ -24,13 +24,15 @@ struct Left {
     groups: usize,
     space: Space,
     largest: usize,
+    /// Reason why the last dataset is not read.
+    why: String,
 }
 
 pub(super) fn contents(file: Vec<u8>, limit: u64) -> Result<Contents, Refusal> {
     let largest = file.len().saturating_mul(MOST_PER_BYTE);
     let file = File::from_bytes(file).map_err(|error| error.to_string())?;
     let mut contents = Contents::default();
-    let mut left = Left { groups: MOST_GROUPS, space: Space::new(limit), largest };
+    let mut left = Left { groups: MOST_GROUPS, space: Space::new(limit), largest, why: String::new() };
     add(&file.root(), "", 0, &mut left, &mut contents).map_err(|error| error.to_string())?;
     left.space.check()?;
     Ok(contents)
@@ -45,8 +47,17 @@ fn add(group: &Group, path: &str, depth: usize, left: &mut Left, contents: &mut 
         return Ok(());
     }
     for (name, data) in datasets {
+        if is_long(&name, contents) {
+            continue;
+        }
+        if let Some(columns) = fields(&data, left) {
+            let group = if path.is_empty() { name } else { format!("{path}/{name}") };
+            for (name, values, form) in columns {
+                contents.add(Array { group: group.clone(), name, size: vec![values.len()], values }, form);
+            }
+            continue;
+        }
         match numbers(&data, left) {
-            _ if is_long(&name, contents) => {}
             Some((size, values)) => {
                 let is_wide = matches!(data.dtype(), Ok(DType::I64 | DType::U64));
                 let form = (if is_wide { 'i' } else { 'f' }, 8);
@@ -55,9 +66,7 @@ fn add(group: &Group, path: &str, depth: usize, left: &mut Left, contents: &mut 
                 let name = with_unit(&name, unit.unwrap_or_default());
                 contents.add(Array { group: path.to_owned(), name, size, values }, form);
             }
-            None => {
-                contents.others.push((name, "no array of numbers that can be read, or one with a scale".to_owned()))
-            }
+            None => contents.others.push((name, left.why.clone())),
         }
     }
     // Names of MATLAB's internal objects begin so.
@@ -94,6 +103,7 @@ fn is_long(name: &str, contents: &mut Contents) -> bool {
 
 /// Size and values of an array of numbers; none for texts and tables, or beyond what is `left` to read.
 fn numbers(data: &Dataset, left: &mut Left) -> Option<(Vec<usize>, Vec<f64>)> {
+    left.why = "no array of numbers".to_owned();
     let attributes = data.attrs().ok()?;
     let class = attributes.get("MATLAB_class").and_then(AttrValue::as_str);
     // Of packed numbers the scale is an attribute.
@@ -101,7 +111,16 @@ fn numbers(data: &Dataset, left: &mut Left) -> Option<(Vec<usize>, Vec<f64>)> {
         let value = |value: &AttrValue| value.as_f64().or_else(|| value.as_i64().map(|value| value as f64));
         attributes.get(*name).is_some_and(|given| value(given) != Some(*neutral))
     });
-    if is_packed || class.is_some_and(|class| NO_NUMBERS.contains(&class)) {
+    if is_packed {
+        left.why = "not readable: its numbers have a scale or an offset as attributes".to_owned();
+        return None;
+    }
+    if let Some(class) = class.filter(|class| !NUMBERS.iter().any(|begin| class.starts_with(begin))) {
+        left.why = match class {
+            "char" => "a text".to_owned(),
+            "cell" => "a cell array".to_owned(),
+            _ => format!("an object of class {class}"),
+        };
         return None;
     }
     // The last dimension varies fastest.
@@ -113,27 +132,98 @@ fn numbers(data: &Dataset, left: &mut Left) -> Option<(Vec<usize>, Vec<f64>)> {
     if matches!(data.dtype().ok()?, Array(..) | Compound(_) | ObjectReference | String | VariableLengthString) {
         return None;
     }
+    if !has_space(data, count, left)? {
+        // Counted only.
+        return Some((size, Vec::new()));
+    }
+    let values = data.read_f64().map_err(|error| left.why = reason(&error)).ok()?;
+    Some((size, values))
+}
+
+/// The fields of a table that are numbers; none for other datasets.
+fn fields(data: &Dataset, left: &mut Left) -> Option<Vec<(String, Vec<f64>, Form)>> {
+    let (DType::Compound(kinds), Datatype::Compound { size, members }) = (data.dtype().ok()?, data.datatype().ok()?)
+    else {
+        return None;
+    };
+    let [rows] = data.shape().ok()?[..] else { return None };
+    let (rows, size) = (usize::try_from(rows).ok()?, usize::try_from(size).ok().filter(|size| *size > 0)?);
+    if !has_space(data, rows, left)? || !left.space.has(rows.checked_mul(members.len())?) {
+        return Some(Vec::new());
+    }
+    let raw = data.read_raw().map_err(|error| left.why = reason(&error)).ok()?;
+    let fields = members.into_iter().zip(kinds).filter_map(|(member, (name, kind))| {
+        let form = form(&kind)?;
+        use Datatype::{FixedPoint, FloatingPoint};
+        let (FixedPoint { byte_order, .. } | FloatingPoint { byte_order, .. }) = member.datatype else { return None };
+        let from = usize::try_from(member.byte_offset).ok()?;
+        let own: Option<Vec<&[u8]>> = raw.chunks_exact(size).map(|row| row.get(from..from + form.1)).collect();
+        let bytes = Bytes { rest: &own?.concat(), is_big_endian: byte_order == DatatypeByteOrder::BigEndian };
+        Some((name, bytes.numbers(form), form))
+    });
+    Some(fields.collect())
+}
+
+fn form(kind: &DType) -> Option<Form> {
+    Some(match kind {
+        DType::F32 => ('f', 4),
+        DType::F64 => ('f', 8),
+        DType::I8 => ('i', 1),
+        DType::I16 => ('i', 2),
+        DType::I32 => ('i', 4),
+        DType::I64 => ('i', 8),
+        DType::U8 => ('u', 1),
+        DType::U16 => ('u', 2),
+        DType::U32 => ('u', 4),
+        DType::U64 => ('u', 8),
+        _ => return None,
+    })
+}
+
+/// Whether there is space for a dataset of `count` elements; none if it cannot be read.
+fn has_space(data: &Dataset, count: usize, left: &mut Left) -> Option<bool> {
     // A chunk is unpacked as a whole.
-    let chunk = data.chunk_shape().ok()?.unwrap_or_default();
+    let chunk = data.chunk_shape().map_err(|error| left.why = reason(&error)).ok()?.unwrap_or_default();
     let lengths = data.shape().ok()?.into_iter().zip(&chunk);
     let chunks = lengths.fold(1_u64, |count, (all, own)| count.saturating_mul(all.div_ceil((*own).max(1))));
     let chunk = chunk.into_iter().try_fold(1, |count, length| usize::try_from(length).ok()?.checked_mul(count))?;
     let most = if count > chunk { count } else { chunk };
-    if most.checked_mul(usize::try_from(data.element_size().ok()?).ok()?)? > left.largest {
+    let element = usize::try_from(data.element_size().ok()?).ok()?;
+    if most.checked_mul(element)? > left.largest {
         return None;
     }
     let listed = usize::try_from(chunks).ok()?.saturating_mul(NUMBERS_PER_CHUNK);
-    if !left.space.has(most.saturating_add(listed)) {
-        // Counted only.
-        return Some((size, Vec::new()));
-    }
-    Some((size, data.read_f64().ok()?))
+    Some(left.space.has(most.saturating_mul(element.div_ceil(8)).saturating_add(listed)))
+}
+
+/// Reason why a dataset is not read.
+fn reason(error: &Error) -> String {
+    let text = error.to_string();
+    let is_newer = text.contains("data layout version");
+    let newer = "it is in the form of HDF5 2.0: write it with libver=('earliest', 'v114')";
+    format!("not readable: {}", if is_newer { newer } else { &text })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use hdf5_pure::FileBuilder;
+    use hdf5_pure::{CompoundTypeBuilder, FileBuilder};
+
+    #[test]
+    fn numbers_in_the_fields_of_a_table_are_columns() {
+        let kind = CompoundTypeBuilder::new().f64_field("t").i32_field("n").f32_field("y").build().unwrap();
+        let row = |k: u8| {
+            [&f64::from(k).to_le_bytes()[..], &i32::from(k).to_le_bytes(), &f32::from(k).to_le_bytes()].concat()
+        };
+        let raw = [row(1), row(2)].concat();
+        let mut builder = FileBuilder::new();
+        builder.create_dataset("rec").with_compound_data(kind, raw, 2);
+        let file = builder.finish().unwrap();
+        let found = contents(file.clone(), u64::MAX).unwrap().arrays;
+        let columns: Vec<_> = found.iter().map(|a| (a.group.as_str(), a.name.as_str(), &a.values[..])).collect();
+        assert_eq!(columns, ["t", "n", "y"].map(|name| ("rec", name, &[1.0, 2.0][..])));
+        assert!(matches!(contents(file, 20), Err(Refusal::Large(_))));
+    }
 
     #[test]
     fn groups_in_groups_are_read_and_texts_left_out() {
@@ -161,7 +251,8 @@ mod tests {
         let units = ["count [mV]", "drive_V [mV]", "force_N [counts]", "neutral", "time_s"]
             .map(|name| ("scan", name, &[1][..]));
         assert_eq!(arrays, [&units[..], &[("scan", "matrix", &[2, 3])]].concat());
-        let reason = "no array of numbers that can be read, or one with a scale".to_owned();
-        assert_eq!(found.others, [("operator".to_owned(), reason.clone()), ("packed".to_owned(), reason)]);
+        let others =
+            [("operator", "a text"), ("packed", "not readable: its numbers have a scale or an offset as attributes")];
+        assert_eq!(found.others, others.map(|(name, what)| (name.to_owned(), what.to_owned())));
     }
 }

@@ -6,7 +6,7 @@ use super::bytes::{
 use super::{Array, Contents};
 use crate::columns::decoded;
 use flate2::read::DeflateDecoder;
-use rawzip::{CompressionMethod, ZipArchive};
+use rawzip::{CompressionMethod, ZipArchive, ZipFileHeaderRecord, ZipSliceArchive};
 use specgen_language::arrays::COMMENT;
 
 /// Bytes of magic and version.
@@ -105,6 +105,49 @@ pub(super) fn is_archive(first: &[u8]) -> bool {
     first.starts_with(b"PK\x03\x04") && name.is_some_and(|name| name.ends_with(b".npy"))
 }
 
+/// The content of an archive of one file, apart from folders and what macOS adds; none if it has several, or is a sheet.
+pub(crate) fn only_file(file: &[u8], limit: u64) -> Result<Option<Vec<u8>>, Refusal> {
+    // Its first bytes show what it may be.
+    let Ok(archive) = ZipArchive::from_slice(file) else { return Ok(None) };
+    let mut found = None;
+    for entry in archive.entries() {
+        let entry = entry.map_err(|_| DAMAGED)?;
+        let path = decoded(entry.file_path().as_ref());
+        if path.ends_with('/') || path.starts_with("__MACOSX/") {
+            continue;
+        }
+        if found.is_some() {
+            return Ok(None);
+        }
+        let mut bytes = Vec::new();
+        let farthest = limit.saturating_mul(FARTHEST);
+        match unpack_entry(&archive, &entry, &path, [limit, farthest], &mut bytes)? {
+            Some(size) if size <= limit => found = Some(bytes),
+            size => return Err(Refusal::Large(size)),
+        }
+    }
+    Ok(found)
+}
+
+/// Number of bytes of a file in an archive, of which the first `left` are added to `bytes`; none if there are more than
+/// `farthest`.
+fn unpack_entry(
+    archive: &ZipSliceArchive<&[u8]>,
+    entry: &ZipFileHeaderRecord,
+    path: &str,
+    [left, farthest]: [u64; 2],
+    bytes: &mut Vec<u8>,
+) -> Result<Option<u64>, Refusal> {
+    let packed = archive.get_entry(entry.wayfinder()).map_err(|_| DAMAGED)?;
+    let data = packed.data();
+    let size = match entry.compression_method() {
+        CompressionMethod::STORE => unpack(packed.verifying_reader(data), left, farthest, bytes),
+        CompressionMethod::DEFLATE => unpack(packed.verifying_reader(DeflateDecoder::new(data)), left, farthest, bytes),
+        _ => return Err("it is packed in an unusual way: pack it by deflate, as numpy.savez does".into()),
+    };
+    size.map_err(|_| format!("its `{path}` is damaged").into())
+}
+
 /// The arrays of an archive, which are called as their files.
 pub(super) fn of_archive(file: &[u8], limit: u64) -> Result<Contents, Refusal> {
     let archive = ZipArchive::from_slice(file).map_err(|_| DAMAGED)?;
@@ -120,20 +163,10 @@ pub(super) fn of_archive(file: &[u8], limit: u64) -> Result<Contents, Refusal> {
             return Err(format!("it has a name of more than {LONGEST_NAME} bytes").into());
         }
         let Some(name) = path.strip_suffix(".npy") else { continue };
-        let method = entry.compression_method();
-        let damaged = |_| format!("its `{path}` is damaged");
-        let packed = archive.get_entry(entry.wayfinder()).map_err(|_| DAMAGED)?;
-        let data = packed.data();
         let (left, farthest) = (limit.saturating_sub(unpacked), limit.saturating_mul(FARTHEST) - unpacked);
         let mut bytes = Vec::new();
-        let there = match method {
-            CompressionMethod::STORE => unpack(packed.verifying_reader(data), left, farthest, &mut bytes),
-            CompressionMethod::DEFLATE => {
-                unpack(packed.verifying_reader(DeflateDecoder::new(data)), left, farthest, &mut bytes)
-            }
-            _ => return Err("it is packed in an unusual way: write it with numpy.savez".into()),
-        };
-        unpacked += there.map_err(damaged)?.ok_or(Refusal::Large(None))?;
+        let size = unpack_entry(&archive, &entry, &path, [left, farthest], &mut bytes)?;
+        unpacked += size.ok_or(Refusal::Large(None))?;
         if unpacked > limit {
             // Counted only.
             continue;

@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 
 use super::bytes::{Bytes, DAMAGED, MOST_ARRAYS, Refusal, Space};
-use super::{Array, Contents};
+use super::{Array, Contents, is_time};
 use crate::columns::decoded;
 use crate::columns::names::with_unit;
 
@@ -25,10 +25,14 @@ struct Object<'a> {
     path: &'a [u8],
     /// Its property `unit_string`.
     unit: &'a [u8],
+    /// Its property `wf_increment`: time between its values, s; 0 if it has none.
+    interval: f64,
     kind: u32,
     /// Bytes of all its values in a chunk.
     size: usize,
     values: Vec<f64>,
+    /// First second of times.
+    start: Option<i64>,
     /// Its place among the objects with values, from [`Objects::first`] on.
     order: Option<u64>,
 }
@@ -54,7 +58,16 @@ impl<'a> Objects<'a> {
     fn place(&mut self, path: &'a [u8]) -> usize {
         let place = *self.places.entry(path).or_insert(self.all.len());
         if place == self.all.len() {
-            self.all.push(Object { path, unit: b"", kind: TEXT, size: 0, values: Vec::new(), order: None });
+            self.all.push(Object {
+                path,
+                unit: b"",
+                interval: 0.0,
+                kind: TEXT,
+                size: 0,
+                values: Vec::new(),
+                start: None,
+                order: None,
+            });
         }
         place
     }
@@ -86,7 +99,8 @@ impl<'a> Objects<'a> {
     }
 }
 
-/// Flags, of a byte each, and times.
+/// Numbers of 8 bytes; flags, of a byte each; and times.
+const DOUBLE: u32 = 10;
 const FLAG: u32 = 0x21;
 const TIME: u32 = 0x44;
 
@@ -97,6 +111,20 @@ fn width(kind: u32) -> Result<usize, String> {
         FLAG => Ok(1),
         TIME => Ok(16),
         _ => form(kind).map(|(_, bytes)| bytes).ok_or_else(|| format!("it has values of type {kind:#x}")),
+    }
+}
+
+/// Appends the values of a channel, `from`, to those before; times in s since the second of the first one, `start`.
+fn append(kind: u32, from: Bytes, values: &mut Vec<f64>, start: &mut Option<i64>) {
+    if let Some(form) = form(kind) {
+        return from.append_numbers(form, values);
+    }
+    // Seconds, and their fraction in units of 2⁻⁶⁴ s, which is first where the low bytes are.
+    for time in from.rest.as_chunks::<16>().0 {
+        let number = if from.is_big_endian { i128::from_be_bytes(*time) } else { i128::from_le_bytes(*time) };
+        let (seconds, fraction) = ((number >> 64) as i64, number as u64);
+        let start = *start.get_or_insert(seconds);
+        values.push(seconds.saturating_sub(start) as f64 + fraction as f64 / 18_446_744_073_709_551_616.0);
     }
 }
 
@@ -154,7 +182,10 @@ fn read_objects<'a>(mut from: Bytes<'a>, objects: &mut Objects<'a>) -> Result<()
                     }
                 }
                 kind => {
-                    from.take(width(kind)?)?;
+                    let value = Bytes { rest: from.take(width(kind)?)?, ..from };
+                    if name == b"wf_increment" && kind == DOUBLE {
+                        objects.all[place].interval = value.numbers(('f', 8)).first().copied().unwrap_or_default();
+                    }
                 }
             }
         }
@@ -167,25 +198,27 @@ impl Objects<'_> {
     fn add(&mut self, chunk: Bytes, is_interleaved: bool, space: &mut Space) -> Result<(), String> {
         let mut at = 0;
         for place in self.listed.values() {
-            let Object { kind, size, values, .. } = &mut self.all[*place];
+            let Object { kind, size, values, start, .. } = &mut self.all[*place];
             if is_interleaved && *kind == TEXT {
                 return Err("it has texts among interleaved numbers: save it with each channel in one piece".to_owned());
             }
             let own = if is_interleaved { width(*kind)? } else { *size };
             let from = at;
             at += own;
-            let Some(form) = form(*kind) else { continue };
+            if matches!(*kind, TEXT | FLAG) {
+                continue;
+            }
             if !is_interleaved {
-                if space.has(own / form.1) {
+                if space.has(own / width(*kind)?) {
                     let rest = chunk.rest.get(from..at).ok_or(DAMAGED)?;
-                    Bytes { rest, ..chunk }.append_numbers(form, values);
+                    append(*kind, Bytes { rest, ..chunk }, values, start);
                 }
                 continue;
             }
             let rows = chunk.rest.chunks_exact(self.row);
             if space.has(rows.len()) {
                 let bytes: Vec<u8> = rows.flat_map(|row| &row[from..from + own]).copied().collect();
-                Bytes { rest: &bytes, ..chunk }.append_numbers(form, values);
+                append(*kind, Bytes { rest: &bytes, ..chunk }, values, start);
             }
         }
         Ok(())
@@ -243,18 +276,41 @@ pub(super) fn contents(file: &[u8], limit: u64) -> Result<Contents, Refusal> {
     if cut > 0 {
         contents.others.push(("last values".to_owned(), format!("{cut} bytes without those of the other channels")));
     }
-    for Object { path, unit, kind, values, .. } in objects.all {
+    let mut waves: Vec<(String, usize, f64)> = Vec::new();
+    for Object { path, unit, interval, kind, values, .. } in objects.all {
         // The path of a channel is `/'group'/'channel'`, with quotes in names doubled.
         let path = decoded(path);
         let Some((group, name)) = path.rsplit_once("'/'") else { continue };
         let plain = |name: &str| name.trim_start_matches("/'").trim_end_matches('\'').replace("''", "'");
-        let (group, name) = (plain(group), with_unit(&plain(name), &decoded(unit)));
-        match form(kind) {
-            Some(form) => contents.add(Array { group, name, size: vec![values.len()], values }, form),
-            None => contents.others.push((name, "no array of numbers".to_owned())),
+        let unit = if kind == TIME { "s".to_owned() } else { decoded(unit) };
+        let (group, name) = (plain(group), with_unit(&plain(name), &unit));
+        let form = form(kind).or_else(|| (kind == TIME).then_some(('f', 8)));
+        let Some(form) = form else {
+            contents.others.push((name, "no array of numbers".to_owned()));
+            continue;
+        };
+        if interval > 0.0 || is_time(&name) {
+            waves.push((group.clone(), values.len(), if is_time(&name) { 0.0 } else { interval }));
+        }
+        contents.add(Array { group, name, size: vec![values.len()], values }, form);
+    }
+    add_times(&waves, &mut space, &mut contents);
+    space.check()?;
+    Ok(contents)
+}
+
+/// Adds the times of waveforms, which have a group, a length and an interval each: for each length of which all have one
+/// interval. That of a channel with times is 0.
+fn add_times(waves: &[(String, usize, f64)], space: &mut Space, contents: &mut Contents) {
+    for (k, (group, length, interval)) in waves.iter().enumerate() {
+        let mut same = waves.iter().filter(|(_, other, _)| other == length);
+        let is_first = waves[..k].iter().all(|(_, other, _)| other != length);
+        if is_first && *interval > 0.0 && same.all(|(.., other)| other == interval) && space.has(*length) {
+            let values = (0..*length).map(|row| row as f64 * interval).collect();
+            let (group, name) = (group.clone(), "time_s".to_owned());
+            contents.add(Array { group, name, size: vec![*length], values }, ('f', 8));
         }
     }
-    Ok(contents)
 }
 
 #[cfg(test)]
@@ -280,6 +336,29 @@ mod tests {
         let lengths = [long((objects.len() + values.len()) as u64), long(objects.len() as u64)].concat();
         let version = word(4713);
         [b"TDSm", &has.to_le_bytes()[..], &version, &lengths, &objects, values].concat()
+    }
+
+    #[test]
+    fn times_are_those_of_a_channel_or_of_the_waveforms() {
+        let (mut values, mut start) = (Vec::new(), None);
+        let time = |seconds: i64, fraction: u64| [fraction.to_le_bytes(), seconds.to_le_bytes()].concat();
+        let rest = [time(3_800_000_000, 1 << 63), time(3_800_000_002, 1 << 62)].concat();
+        append(TIME, Bytes { rest: &rest, is_big_endian: false }, &mut values, &mut start);
+        let reversed: Vec<u8> = rest[..16].iter().rev().copied().collect();
+        append(TIME, Bytes { rest: &reversed, is_big_endian: true }, &mut values, &mut start);
+        assert_eq!(values, [0.5, 2.25, 0.5]);
+        let wave = |group: &str, length, interval| (group.to_owned(), length, interval);
+        for (waves, expected) in [
+            (vec![wave("a", 3, 0.5), wave("b", 3, 0.5), wave("b", 2, 0.25)], &[("a", 1.0), ("b", 0.25)][..]),
+            (vec![wave("a", 3, 0.5), wave("b", 3, 0.25)], &[]),
+            (vec![wave("a", 3, 0.5), wave("b", 3, 0.0)], &[]),
+        ] {
+            let mut contents = Contents::default();
+            add_times(&waves, &mut Space::new(1000), &mut contents);
+            let found =
+                contents.arrays.iter().map(|array| (array.group.as_str(), array.values[array.values.len() - 1]));
+            assert_eq!(found.collect::<Vec<_>>(), expected);
+        }
     }
 
     #[test]

@@ -36,7 +36,13 @@ pub(super) fn parse(text: &str, quantity: &Quantity, per: Option<f64>) -> Result
         },
     };
     let (unit, offset) = rest.find(['+', '-']).map_or((rest, ""), |at| rest.split_at(at));
-    let (unit, denominator) = unit.split_once('/').map_or((unit, None), |(unit, below)| (unit, Some(below)));
+    // A rate has a slash of its own.
+    let mut slashes = unit.match_indices('/').map(|(at, _)| at);
+    let at = slashes.clone().find(|at| quantity.per(&unit[..*at]).is_some()).or_else(|| slashes.next());
+    let (unit, denominator) = match at.filter(|_| quantity.per(unit).is_none()) {
+        Some(at) => (&unit[..at], Some(&unit[at + 1..])),
+        None => (unit, None),
+    };
     let size = |unit: &str| if unit.trim().is_empty() { per } else { quantity.per(unit) };
     let offset = if offset.is_empty() { Some((0.0, "")) } else { number(offset) };
     let Some((offset, offset_unit)) = offset else { return expected("a number behind the sign of the offset") };
@@ -100,6 +106,8 @@ mod tests {
             assert!((factor - scale[0]).abs() < 1e-12 && (offset - scale[1]).abs() < 1e-12, "{text}: {found:?}");
             assert_eq!((found.column.as_str(), found.denominator.as_deref()), (column, denominator), "{text}");
         }
+        let rate = parse("7*-2 mm/s/V", quantity("vx_um/s").unwrap(), None).unwrap().unwrap();
+        assert_eq!((rate.conversion.scale, rate.denominator.as_deref()), (Some([-2e3, 0.0]), Some("V")));
         assert_eq!(parse("Voltage (Filtered)", displacement, Some(1.0)), Ok(None));
         for bad in ["CH2*", "CH2*5", "CH2*5 V", "CH2*0 um", "*5 um", "CH2*5 um+x"] {
             assert!(parse(bad, displacement, None).is_err(), "{bad}");

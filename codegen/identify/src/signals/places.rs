@@ -2,11 +2,10 @@
 
 use super::{ColumnSpec, TIME};
 use crate::columns::names::{self, Conversion, Fit, Quantity};
-use crate::columns::{Column, Head, Shape};
+use crate::columns::{Column, Format, Head, Shape};
 use crate::findings::Findings;
 use crate::reading::{ColumnChoice, Reading};
 use specgen_language::diagnostic::{Code, codes};
-use specgen_language::shell;
 
 /// Headers within this edit distance of a requested name are suggested.
 const NEAR: usize = 4;
@@ -23,13 +22,18 @@ pub(super) struct Places {
 }
 
 /// `None` after every problem was reported.
-pub(super) fn find(header: &Head, wanted: &[ColumnSpec], reading: &Reading, findings: &mut Findings) -> Option<Places> {
-    let search = Search { header, wanted, reading };
+pub(super) fn find(
+    header: &Head,
+    wanted: &[ColumnSpec],
+    (reading, format): (&Reading, &Format),
+    findings: &mut Findings,
+) -> Option<Places> {
+    let search = Search { header, wanted, reading, format };
     let line = Some(header.line);
     let names: Vec<&str> = wanted.iter().map(|w| w.name).collect();
     for unknown in reading.unknown(&names) {
-        let message = format!("`--columns` names `{unknown}`, which this kind of record does not have");
-        findings.add(codes::RECORD_HEADER, line, message, &format!("it has {}", listed(&names)));
+        let message = format!("{} names `{unknown}`, which this kind of file does not have", reading.option());
+        findings.add(format.header, line, message, &format!("it has {}", listed(&names)));
     }
     let interval = search.interval(findings);
     let mut columns = Vec::new();
@@ -41,12 +45,13 @@ pub(super) fn find(header: &Head, wanted: &[ColumnSpec], reading: &Reading, find
         if matches!(found, Ok(None)) && w.required && !counted && !(w.name == DRIVE && measured) {
             missing.push(w.name);
         }
-        columns.push(found.unwrap_or_else(|(code, message, help)| findings.refuse(code, line, message, &help)));
+        let found = found.unwrap_or_else(|(code, message, help)| findings.refuse(code, line, message, &help));
+        columns.push(found.map(|column| Column { conversion: column.conversion.per(w.per), ..column }));
     }
     let suggested = search.suggested(&missing, &columns);
     for name in missing {
         let message = format!("column `{name}` is missing; {}", search.present());
-        findings.add(codes::RECORD_HEADER, line, message, &search.help(name, suggested.as_deref()));
+        findings.add(format.header, line, message, &search.help(name, suggested.as_deref()));
     }
     let found: Vec<&Column> = columns.iter().flatten().collect();
     let twice = found.iter().enumerate().find_map(|(k, column)| {
@@ -54,7 +59,12 @@ pub(super) fn find(header: &Head, wanted: &[ColumnSpec], reading: &Reading, find
     });
     if let Some((first, second, at)) = twice {
         let message = format!("column {at} is named for `{first}` and for `{second}`");
-        findings.add(codes::RECORD_COLUMN_TWICE, line, message, "name another column for one of them in `--columns`");
+        findings.add(
+            codes::RECORD_COLUMN_TWICE,
+            line,
+            message,
+            &format!("name another column for one of them in {}", reading.option()),
+        );
     }
     if findings.any_error() { None } else { Some(Places { columns, interval }) }
 }
@@ -66,6 +76,7 @@ struct Search<'a> {
     header: &'a Head,
     wanted: &'a [ColumnSpec],
     reading: &'a Reading,
+    format: &'a Format,
 }
 
 impl Search<'_> {
@@ -81,7 +92,7 @@ impl Search<'_> {
         match found[..] {
             [(first, a, _), (second, b, _), ..] if first == second || first != Fit::Exact => {
                 let message = format!("column `{name}` appears twice, as columns {} and {}", a + 1, b + 1);
-                let help = format!("keep one of them, or give `--columns {}`", shell::quoted(&self.entry(name, a)));
+                let help = format!("keep one of them, or give `{}`", self.reading.given(&self.entry(name, a)));
                 Err((codes::RECORD_COLUMN_TWICE, message, help))
             }
             [(_, at, per), ..] => Ok(Some(Column { at, name, conversion: Conversion::unit(per) })),
@@ -100,15 +111,17 @@ impl Search<'_> {
         }
         let scaled = choice.scaled.as_ref().and_then(|scaled| Some((self.at(&scaled.column)?, scaled)));
         let Some((at, scaled)) = scaled else {
-            let message = format!("`--columns` names `{}` for `{name}`; {}", choice.column, self.present());
+            let message =
+                format!("{} names `{}` for `{name}`; {}", self.reading.option(), choice.column, self.present());
             let help = "name a column as the file does, or by its number from 1".to_owned();
-            return Err((codes::RECORD_HEADER, message, help));
+            return Err((self.format.header, message, help));
         };
         let header = self.header.names.get(at).map_or("", String::as_str);
         let denominator = scaled.denominator.as_deref().unwrap_or_default();
         let per = names::per_denominator(header, denominator).map_err(|own| {
-            let message = format!("`--columns` scales `{header}` per {denominator}, but its unit is {own}");
-            (codes::RECORD_HEADER, message, "give the factor per unit of the column".to_owned())
+            let option = self.reading.option();
+            let message = format!("{option} scales `{header}` per {denominator}, but its unit is {own}");
+            (self.format.header, message, "give the factor per unit of the column".to_owned())
         })?;
         Ok(Column { at, name, conversion: Conversion { per, ..scaled.conversion } })
     }
@@ -133,7 +146,9 @@ impl Search<'_> {
         let (at, given) = named.or_else(|| scaled.and_then(|scaled| Some((self.at(&scaled.column)?, scaled.per))))?;
         let (header, quantity) = (self.header.names.get(at)?, names::quantity(choice.quantity)?);
         let Some(unit) = names::own_unit(header) else {
-            return (scaled.is_none() && names::has_unknown_unit(header)).then_some((at, None));
+            let is_known = quantity.divided(header).is_some_and(|(_, per)| per == given);
+            let is_other = !is_known && scaled.is_none() && names::has_unknown_unit(header);
+            return is_other.then_some((at, None));
         };
         let per = quantity.per(unit);
         // A factor may be per unit of another kind.
@@ -143,8 +158,8 @@ impl Search<'_> {
     fn check_unit(&self, choice: &ColumnChoice) -> Result<(), Problem> {
         let Some((at, unit)) = self.other_unit(choice) else { return Ok(()) };
         let (header, name) = (&self.header.names[at], choice.quantity);
-        let shown = unit.unwrap_or("not known");
-        let message = format!("`--columns` names `{header}` for `{name}`, but its unit is {shown}");
+        let shown = unit.unwrap_or("not known, or another one");
+        let message = format!("{} names `{header}` for `{name}`, but its unit is {shown}", self.reading.option());
         // Every entry with the unit of its column.
         let with_unit = |choice: &ColumnChoice| {
             self.other_unit(choice).map_or_else(|| choice.text.clone(), |(at, _)| self.entry(choice.quantity, at))
@@ -155,8 +170,8 @@ impl Search<'_> {
             Some(_) if self.at(&choice.column).is_none() => format!(", followed by scale and offset in {shown}"),
             Some(_) => String::new(),
         };
-        let help = format!("give `--columns {}`{rest}", shell::quoted(&all.join(",")));
-        Err((codes::RECORD_HEADER, message, help))
+        let help = format!("give `{}`{rest}", self.reading.given(&all.join(",")));
+        Err((self.format.header, message, help))
     }
 
     /// The places of the columns with this name: as written, or in other letters, or without a unit, which may come from
@@ -237,7 +252,9 @@ impl Search<'_> {
             }
             let of = |(at, shape): &(usize, Shape)| (self.likelihood(name, *at, *shape), *at);
             // The first of equals.
-            let other = free.iter().filter(|(at, _)| name == TIME || !is_time(*at));
+            let is_rate = |at: usize| self.header.names.get(at).is_some_and(|name| names::is_rate(name));
+            let is_kind = |at: usize| is_rate(at) == name.contains("/s") && (name == TIME || !is_time(at));
+            let other = free.iter().filter(|(at, _)| is_kind(*at));
             let best = other.map(of).rev().max_by_key(|(likelihood, _)| *likelihood);
             match best {
                 Some((likelihood, _)) if name == TIME && likelihood < 0 => rate = true,
@@ -249,9 +266,8 @@ impl Search<'_> {
             }
         }
         let kept: Vec<String> = self.reading.chosen().map(|choice| choice.text.clone()).chain(entries).collect();
-        let columns = shell::quoted(&kept.join(","));
-        let options =
-            [(!kept.is_empty()).then(|| format!("--columns {columns}")), rate.then(|| "--rate HZ".to_owned())];
+        let columns = self.reading.given(&kept.join(","));
+        let options = [(!kept.is_empty()).then_some(columns), rate.then(|| "--rate HZ".to_owned())];
         Some(options.into_iter().flatten().collect::<Vec<_>>().join(" ")).filter(|options| !options.is_empty())
     }
 
@@ -291,7 +307,8 @@ impl Search<'_> {
         let Some(quantity) = names::quantity(name) else { return String::new() };
         let (plain, word) = (quantity.plain(), self.word(at));
         let one = if header.starts_with(names::MINUS) { "-1" } else { "1" };
-        match names::own_unit(header) {
+        let of_rate = || names::unit_in_brackets(header).filter(|unit| quantity.per(unit).is_some());
+        match names::own_unit(header).map(str::to_owned).or_else(of_rate).as_deref() {
             Some(unit) if quantity.per(unit).is_some() && one == "-1" => format!("{plain}={word}*-1 {unit}"),
             Some(unit) if quantity.per(unit).is_some() => format!("{plain}_{unit}={word}"),
             Some(unit) => format!("{plain}={word}*{one} {}/{unit}", quantity.unit()),
@@ -346,12 +363,20 @@ impl Search<'_> {
             return format!("the file has sample numbers: give `{}`", suggested.unwrap_or("--rate HZ"));
         }
         let Some(quantity) = names::quantity(name) else { return String::new() };
+        if let Some(rate) = names.iter().find(|header| names::is_rate(header) && quantity.unit() == "um") {
+            return format!("`{rate}` is a rate: record or export `{name}` itself{or_give}");
+        }
         match self.near(name).map(|at| &names[at]) {
             Some(header) if has_other_unit(header, quantity) => {
                 let all = quantity.all_names();
                 format!("the unit of `{header}` is not known: convert it to one of {all}{or_give}")
             }
             Some(header) => format!("rename `{header}` to `{name}` if that is what it holds{or_give}"),
+            None if suggested.is_none() && (0..names.len()).all(|at| self.resemblance(name, at) <= 0) => {
+                format!(
+                    "record it as well, in a column `{name}`, whose unit is part of the name: no column seems to hold it"
+                )
+            }
             None => format!("name the column that holds it `{name}`; the unit is part of the name{or_give}"),
         }
     }
@@ -372,13 +397,9 @@ fn listed(names: &[&str]) -> String {
 mod tests {
     use super::*;
     use crate::columns::{self, RECORD};
+    use crate::signals::{optional, required};
 
-    const WANTED: [ColumnSpec; 4] = [
-        ColumnSpec { name: TIME, required: true },
-        ColumnSpec { name: DRIVE, required: true },
-        ColumnSpec { name: MONITOR, required: false },
-        ColumnSpec { name: "displacement_um", required: true },
-    ];
+    const WANTED: [ColumnSpec; 4] = [required(TIME), required(DRIVE), optional(MONITOR), required("displacement_um")];
 
     #[test]
     fn suggestions_assign_every_missing_column() {
@@ -411,6 +432,7 @@ mod tests {
             ("sample,a,b\n0,1,2\n", "`--columns drive_V=a,displacement_um=b --rate HZ`"),
             ("time_s,drive_V,displacement_ft\n0,1,2\n", "`--columns 'displacement=displacement_ft*1 um'`"),
             ("time_s,drive_V,-Displacement (nm)\n0,1,2\n", "`--columns 'displacement=-Displacement (nm)*-1 nm'`"),
+            ("time_s,Vib [ m/s ],Amp,y\n0,1,2,3\n", "`--columns drive_V=Amp,displacement_um=y`"),
         ] {
             let all = found(text, &Reading::default()).unwrap_err();
             assert!(all.iter().all(|one| one.contains(options)), "{text}: {all:?}");
@@ -429,7 +451,7 @@ mod tests {
     fn found(text: &str, reading: &Reading) -> Result<Vec<Option<usize>>, Vec<String>> {
         let mut findings = Findings::new("r.csv");
         let (header, _) = columns::open(text.as_bytes(), &RECORD, &mut findings).unwrap();
-        let places = find(&header, &WANTED, reading, &mut findings);
+        let places = find(&header, &WANTED, (reading, &RECORD), &mut findings);
         let all = findings.into_diagnostics();
         assert_eq!(places.is_none(), !all.is_empty());
         let problems = all.into_iter().map(|d| format!("{} / {}", d.message, d.help)).collect();

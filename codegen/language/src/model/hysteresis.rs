@@ -24,6 +24,8 @@ section! {
         memory: usize = integer(8, 256), Default(64), "" ["depth"], 64;
         /// Reversal-curve files, relative to the spec: one for all legs, or six. A table written by `specgen identify -o` is used as it is. With [control], [] as long as no leg is identified: the controller then has the open drive only.
         records: Vec<String> = Shape::Records, Required, "" ["record", "file", "files", "data"], ["records/reference-forc.csv"];
+        /// Columns of reversal-curve files by header or number, with units, scale and offset as in `--columns` of `specgen identify`.
+        columns: Option<String> = Shape::One(Item::Columns), Rule("found by the names in the files"), "", "drive_V=2,displacement_um=3";
         /// Leg model of reversal-curve records: the Preisach table; or chosen by its error on curves that were held out, "auto"; or a family by name, with creep where the record shows it. A table written by `specgen identify -o` keeps its own.
         model: LegModelKind = one_of(LegModelKind::WORDS), Default("preisach"), "" ["leg_model", "family"], "preisach";
         /// Rate dependence in model and inverse: none; the dynamic Preisach model (6); creep after the static model. `specgen identify rate` compares them.

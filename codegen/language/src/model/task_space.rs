@@ -360,6 +360,8 @@ section! {
         time = one(Dimension::TIME, Range::closed(1e-5, 3600.0), "ms"), Rule("error for a step"), "", "4 ms";
         /// For a waveform: the table of poses, a CSV file relative to the spec.
         file = Shape::One(Item::File), Rule("error for a waveform"), "", "waveforms/circle.csv";
+        /// For a waveform: columns by header or number, with units, scale and offset as in `--columns` of `specgen identify`.
+        columns = Shape::One(Item::Columns), Rule("found by the names in the file"), "", "x_um=Ch1,z=3*2 um/V";
         /// For a waveform: time from one row to the next.
         period = one(Dimension::TIME, Range::closed(1e-6, 3600.0), "ms"), Rule("error for a waveform"), "", "1 ms";
         /// For a waveform: whether it starts again after the last row.
@@ -398,6 +400,8 @@ pub enum TrajectoryKind {
         period: f64,
         /// Starts again after the last row.
         repeat: bool,
+        /// Description of its columns.
+        columns: Option<String>,
     },
 }
 
@@ -429,6 +433,7 @@ impl TrajectoryKind {
                 file: fields.name(&key("file"))?.to_owned(),
                 period: fields.number(&key("period"))?,
                 repeat: fields.flag(&key("repeat")).unwrap_or(false),
+                columns: fields.name(&key("columns")).map(str::to_owned),
             }),
         }
     }

@@ -15,13 +15,15 @@ const LARGEST: u64 = 1 << 16;
 /// Largest coordinate, m, as of `geometry.base_joints`.
 const FARTHEST: f64 = 10.0;
 const EXAMPLE: &str = "leg,where,x_mm,y_mm,z_mm";
+const ROW_EXAMPLE: &str = "leg,base_x_mm,base_y_mm,base_z_mm,platform_x_mm,platform_y_mm,platform_z_mm";
 
 /// Columns that say which joint a line is, in small letters.
 const LEGS: &[&str] = &["leg", "number", "no", "no.", "nr", "#", "id", "index"];
 const BODIES: &[&str] = &["where", "body", "part", "plate", "side", "joint", "name", "point", "label"];
 /// How the name of a joint begins, or its only letter.
-const BASE: (&[&str], char) = (&["base", "bottom", "fixed", "ground", "lower"], 'b');
-const PLATFORM: (&[&str], char) = (&["platform", "top", "moving", "mobile", "upper"], 'p');
+type BodyNames = (&'static [&'static str], char);
+const BASE: BodyNames = (&["base", "bottom", "fixed", "ground", "lower"], 'b');
+const PLATFORM: BodyNames = (&["platform", "top", "moving", "mobile", "upper"], 'p');
 
 /// What is wrong with a file: its line, if it is one, and the help.
 struct Refusal {
@@ -64,6 +66,8 @@ struct Head<'a> {
     leg: Option<usize>,
     body: Option<usize>,
     coordinates: [(usize, &'a str); 3],
+    /// Those of the platform, if a line has both joints of a leg.
+    of_platform: Option<[(usize, &'a str); 3]>,
     /// Number of columns.
     count: usize,
     /// Whether numbers have a decimal comma.
@@ -81,8 +85,9 @@ struct Joint {
 /// The joints of the base and of the platform, leg by leg, m.
 fn joints(text: &str) -> Result<[[[f64; 3]; 6]; 2], Refusal> {
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
-    let numbered = text.lines().enumerate().map(|(at, line)| (at + 1, line.trim()));
-    let mut lines = numbered.filter(|(_, line)| !line.is_empty() && !line.starts_with(['#', '%']));
+    // A tab before the first cell makes it an empty one.
+    let numbered = text.lines().enumerate().map(|(at, line)| (at + 1, line.trim_end().trim_start_matches(' ')));
+    let mut lines = numbered.filter(|(_, line)| !line.trim().is_empty() && !line.starts_with(['#', '%']));
     let Some((first, names)) = lines.next() else {
         return refuse(1, "the file is empty".to_owned(), format!("begin with a head such as {EXAMPLE}"));
     };
@@ -94,7 +99,8 @@ fn joints(text: &str) -> Result<[[[f64; 3]; 6]; 2], Refusal> {
     }
     // Beside decimal points a comma would divide thousands.
     head.has_commas = head.separator != ',' && !lines.clone().any(|(_, line)| line.contains('.'));
-    let coordinates = lines.clone().flat_map(|(line, text)| head.coordinates_of(text).map(|cell| (line, cell)));
+    let of_line = |(line, text)| head.coordinates_of(text).into_iter().map(move |cell| (line, cell));
+    let coordinates = lines.clone().flat_map(of_line);
     let mut commas = coordinates.filter(|(_, cell)| head.has_commas && cell.contains(','));
     if let Some((line, cell)) = commas.clone().next()
         && commas.all(|(_, cell)| quantity::may_divide_thousands(cell, ','))
@@ -102,7 +108,10 @@ fn joints(text: &str) -> Result<[[[f64; 3]; 6]; 2], Refusal> {
         let message = format!("the comma of `{}` may divide thousands or begin the decimals", text::shorten(cell));
         return refuse(line, message, "write decimal points, and nothing between thousands");
     }
-    let mut found = lines.map(|(line, text)| head.joint(line, text)).collect::<Result<Vec<Joint>, Refusal>>()?;
+    let mut found = Vec::new();
+    for (line, text) in lines {
+        found.extend(head.joints(line, text)?);
+    }
     if found.len() != 12 {
         let message = format!("there are {} joints, expected 12", found.len());
         return Err(Refusal {
@@ -152,6 +161,26 @@ fn of_body(all: &[Joint], is_platform: bool) -> Result<[[f64; 3]; 6], Refusal> {
     Ok(points)
 }
 
+/// What follows the name of a coordinate, such as `x`, or of one of a body, such as `Base X`, `bx` or `x_base`.
+fn unit_of(name: &str, axis: char, body: Option<BodyNames>) -> Option<&str> {
+    let is_named = |name: &str| {
+        let name: String = name.chars().filter(|c| c.is_alphanumeric()).flat_map(char::to_lowercase).collect();
+        let Some((words, letter)) = body else { return name.chars().eq([axis]) };
+        let mut rests = [name.strip_prefix(axis), name.strip_suffix(axis)].into_iter().flatten();
+        rests.any(|rest| words.contains(&rest) || rest.chars().eq([letter]))
+    };
+    let ends = name.char_indices().map(|(at, _)| at).chain([name.len()]);
+    // `-x` has the other sign.
+    let mut ends = ends
+        .filter(|_| !name.starts_with(['-', '\u{2212}', '\u{2013}']))
+        .filter(|end| !name[*end..].starts_with(char::is_alphanumeric));
+    ends.find(|end| is_named(&name[..*end])).map(|end| &name[end..])
+}
+
+fn is_length(unit: &str) -> bool {
+    quantity::parse_as(&format!("1 {unit}"), Dimension::LENGTH).is_ok_and(|one| one.dimension == Dimension::LENGTH)
+}
+
 fn cells(line: &str, separator: char) -> Vec<&str> {
     if separator == ' ' {
         return line.split_whitespace().map(|cell| cell.trim_matches('"')).collect();
@@ -167,46 +196,62 @@ impl<'a> Head<'a> {
         // The clearest name first.
         let called =
             |known: &[&str]| known.iter().find_map(|one| names.iter().position(|name| name.to_lowercase() == *one));
-        let coordinate = |axis: char| {
-            let mut found = names.iter().enumerate().filter_map(|(at, name)| {
-                let unit = name.strip_prefix([axis, axis.to_ascii_uppercase()])?;
-                let is_name = !unit.starts_with(char::is_alphanumeric);
+        // Columns that may hold a coordinate, each with what follows its name, and with its unit in the line below.
+        let candidates = |axis: char, body: Option<BodyNames>| {
+            let all = names.iter().copied().enumerate().filter_map(|(at, name)| {
                 let plain = |unit: &'a str| unit.trim_matches(|c: char| c.is_whitespace() || "_[]()/,.".contains(c));
                 let below = units.get(at).copied().unwrap_or_default();
-                is_name.then(|| (at, [unit, below].map(plain)))
+                Some((at, [unit_of(name, axis, body)?, below].map(plain)))
             });
-            let head = format!("write the names and the unit in the first line: {EXAMPLE}");
-            let Some((at, both)) = found.next() else {
-                return refuse(line, format!("there is no column {axis}"), head);
-            };
-            if let Some((second, _)) = found.next() {
-                let message = format!("the columns {} and {} are both {axis}", at + 1, second + 1);
+            all.collect::<Vec<_>>()
+        };
+        let head = || format!("write the names and the unit in the first line: {EXAMPLE}, or {ROW_EXAMPLE}");
+        let coordinate = |axis: char, body: Option<BodyNames>| {
+            let mut found = candidates(axis, body);
+            if found.is_empty() {
+                return refuse(line, format!("there is no column {axis}"), head());
+            }
+            // Not `x_tol`.
+            found.retain(|(_, [name, _])| name.is_empty() || is_length(name));
+            if let [(first, _), (second, _), ..] = found[..] {
+                let message = format!("the columns {} and {} are both {axis}", first + 1, second + 1);
                 return refuse(line, message, "delete one of them");
             }
-            let unit = match both {
-                ["", unit] | [unit, ""] => unit,
-                [name, below] if name == below => name,
-                [name, below] => {
+            match found[..] {
+                [(at, ["", unit] | [unit, ""])] if is_length(unit) => Ok((at, unit)),
+                [(at, [name, below])] if name == below && !name.is_empty() => Ok((at, name)),
+                [(_, [name, below])] if !name.is_empty() && !below.is_empty() => {
                     let message = format!("the unit of {axis} is {name} in its name, and {below} in the line of units");
-                    return refuse(line, message, "keep the right one of the two");
+                    refuse(line, message, "keep the right one of the two")
                 }
-            };
-            if quantity::parse_as(&format!("1 {unit}"), Dimension::LENGTH)
-                .is_ok_and(|one| one.dimension == Dimension::LENGTH)
-            {
-                return Ok((at, unit));
+                _ => refuse(line, format!("the column {axis} has no unit of length"), head()),
             }
-            refuse(line, format!("the column {axis} has no unit of length"), head)
         };
-        let coordinates = [coordinate('x')?, coordinate('y')?, coordinate('z')?];
+        let all = |body| Ok::<_, Refusal>([coordinate('x', body)?, coordinate('y', body)?, coordinate('z', body)?]);
         let (leg, body, count) = (called(LEGS), called(BODIES), names.len());
-        Ok(Self { separator, leg, body, coordinates, count, has_commas: false })
+        let head =
+            Self { separator, leg, body, coordinates: [(0, ""); 3], of_platform: None, count, has_commas: false };
+        if candidates('x', Some(PLATFORM)).is_empty() {
+            return Ok(Self { coordinates: all(None)?, ..head });
+        }
+        let (coordinates, of_platform) = (all(Some(BASE))?, Some(all(Some(PLATFORM))?));
+        // A line has both bodies, and its name only says the leg.
+        Ok(Self { coordinates, of_platform, leg: leg.or(body), body: None, ..head })
     }
 
     /// The texts of the coordinates.
-    fn coordinates_of<'t>(&self, text: &'t str) -> [&'t str; 3] {
+    fn coordinates_of<'t>(&self, text: &'t str) -> Vec<&'t str> {
         let cells = cells(text, self.separator);
-        self.coordinates.map(|(at, _)| cells.get(at).copied().unwrap_or_default())
+        let places = self.coordinates.into_iter().chain(self.of_platform.into_iter().flatten());
+        places.map(|(at, _)| cells.get(at).copied().unwrap_or_default()).collect()
+    }
+
+    /// The joints in a line: one, or both of a leg.
+    fn joints(&self, line: usize, text: &str) -> Result<Vec<Joint>, Refusal> {
+        let joint = self.joint(line, text)?;
+        let Some(coordinates) = self.of_platform else { return Ok(vec![joint]) };
+        let other = Self { coordinates, ..*self }.joint(line, text)?;
+        Ok(vec![Joint { is_platform: Some(false), ..joint }, Joint { is_platform: Some(true), ..other }])
     }
 
     fn joint(&self, line: usize, text: &str) -> Result<Joint, Refusal> {
@@ -237,9 +282,8 @@ impl<'a> Head<'a> {
         let letter = letter
             .and_then(|letter| ["a", "b", "c", "d", "e", "f"].iter().position(|one| letter.eq_ignore_ascii_case(one)));
         let plain = name.trim_end_matches([' ', '_', '-']).to_lowercase();
-        let is = |(words, letter): (&[&str], char)| {
-            words.iter().any(|word| plain.starts_with(word)) || plain.chars().eq([letter])
-        };
+        let is =
+            |(words, letter): BodyNames| words.iter().any(|word| plain.starts_with(word)) || plain.chars().eq([letter]);
         let is_platform = match plain.as_str() {
             "" => None,
             _ if is(BASE) => Some(false),
@@ -250,7 +294,8 @@ impl<'a> Head<'a> {
             }
         };
         let given = self.leg.map_or(number, cell);
-        let leg = given.parse().ok().or(letter.map(|letter| letter as i64));
+        let digits = given.trim_start_matches(|c: char| c.is_alphabetic() || matches!(c, ' ' | '_'));
+        let leg = digits.parse().ok().or(letter.map(|letter| letter as i64));
         if leg.is_none() && (self.leg.is_some() || !given.is_empty()) {
             let message = format!("`{}` is no number of a leg", text::shorten(given));
             return refuse(line, message, "number the legs from 0 to 5, or from 1 to 6");
@@ -276,6 +321,15 @@ mod tests {
             }
         }
         text
+    }
+
+    /// Six lines, each with both joints of a leg in mm.
+    fn of_legs(head: &str, row: impl Fn(usize, String) -> String) -> String {
+        let line = |(leg, [x, y]): (usize, &[f64; 2])| {
+            let row = row(leg, format!("{},{},0,{},{},1", x * 150.0, y * 150.0, x * 100.5, y * 100.5));
+            format!("{row}\n")
+        };
+        format!("{head}\n{}", BODY.iter().enumerate().map(line).collect::<String>())
     }
 
     fn body(is_platform: bool) -> &'static str {
@@ -334,6 +388,32 @@ mod tests {
                     format!("{}_{},{x},{y},{z}", body(top), ["A", "B", "C", "D", "E", "F"][leg])
                 })),
             ),
+            ("six lines", of_legs("leg,bx_mm,by_mm,bz_mm,px_mm,py_mm,pz_mm", |leg, row| format!("{leg},{row}"))),
+            (
+                "six lines with words",
+                of_legs("Base X [mm];Base Y [mm];Base Z [mm];Top X [mm];Top Y [mm];Top Z [mm]", |_, row| {
+                    row.replace(',', ";")
+                }),
+            ),
+            (
+                "six lines, reversed, the axis first",
+                turned(of_legs("x_base,y_base,z_base,x_platform,y_platform,z_platform,name", |leg, row| {
+                    format!("{row},Leg {}", leg + 1)
+                }))
+                .replacen("name", "name\nmm,mm,mm,mm,mm,mm,", 1),
+            ),
+            (
+                "tolerances",
+                file("leg,where,x_mm,x_tol,y_mm,z_mm\n,,mm,mm,mm,mm", 0, |leg, top, [x, y, z]| {
+                    format!("{leg},{},{x},0.1,{y},{z}", body(top))
+                }),
+            ),
+            (
+                "tabs, units below an empty cell",
+                file("NAME\tX\tY\tZ\n\tmm\tmm\tmm", 0, |leg, top, point| {
+                    format!("{}_{leg}\t{}", body(top), point.join("\t"))
+                }),
+            ),
             (
                 "metres",
                 file("# CAD\nleg,where,x_m,y_m,z_m", 0, |leg, top, point| {
@@ -369,6 +449,8 @@ mod tests {
             (plain.replacen("z_mm", "x_m,z_mm", 1), Some(1), "the columns 3 and 5 are both x"),
             (file("x_mm;y_mm;z_mm", 0, |_, _, _| "1,234;5;6".to_owned()), Some(2), "the comma of `1,234` may divide"),
             (without_last, None, "there are 11 joints"),
+            (of_legs("leg,bx_mm,by_mm,bz_mm,px_mm,py_mm,w", |leg, row| format!("{leg},{row}")), Some(1), "no column z"),
+            (of_legs("leg,bx,by,bz,px,py,pz", |leg, row| format!("{leg},{row}")), Some(1), "column x has no unit"),
         ] {
             let refused = joints(&text).err().unwrap_or_else(|| panic!("{text}"));
             assert_eq!(refused.line, line, "{}: {text}", refused.message);

@@ -31,6 +31,7 @@ pub(super) fn wanted(key: &Key, path: &str, placeholder: &str) -> String {
         Some(item @ (Item::Choice(_) | Item::Flag)) => range_of(item),
         Some(Item::Name) => "a name: a letter, then letters, digits, - and _".to_owned(),
         Some(Item::Reason) => "your reason, in words".to_owned(),
+        Some(Item::Columns) => "a description of columns, such as drive_V=2".to_owned(),
         Some(Item::File) | None if placeholder == "<file>" => "the name of your file, relative to the spec".to_owned(),
         Some(Item::File) | None => "your own text".to_owned(),
     }
@@ -58,6 +59,7 @@ pub(super) fn range_of(item: Item) -> String {
         Item::File => "a file".to_owned(),
         Item::Name => "a name".to_owned(),
         Item::Reason => "a reason in words".to_owned(),
+        Item::Columns => "a description of columns".to_owned(),
     }
 }
 

@@ -192,6 +192,7 @@ fn item_schema(item: Item) -> Map<String, Value> {
         Item::Choice(words) => json!({"type": "string", "enum": words}),
         Item::Flag => json!({"type": "boolean"}),
         Item::File => json!({"type": "string", "pattern": r"^[^/\\][^\\]*$"}),
+        Item::Columns => json!({"type": "string", "pattern": "="}),
         Item::Reason => json!({"type": "string", "pattern": r"\S\s+\S"}),
         Item::Name => {
             json!({"type": "string", "pattern": "^[A-Za-z][A-Za-z0-9_-]*$", "maxLength": MAX_NAME})

@@ -222,6 +222,10 @@ impl ValueReader<'_> {
             },
             Item::File => self.file(path, value).map(Scalar::Name),
             Item::Name => self.name(path, value).map(Scalar::Name),
+            Item::Columns => match value.get_ref() {
+                DeValue::String(found) if found.contains('=') => Some(Scalar::Name(found.to_string())),
+                _ => self.wrong_type(path, value, "a description of columns, such as \"drive_V=2\"", None),
+            },
             Item::Reason => match value.get_ref() {
                 DeValue::String(found) if found.split_whitespace().count() > 1 => Some(Scalar::Name(found.to_string())),
                 _ => self.wrong_type(path, value, "a reason in words, in quotes", None),

@@ -252,7 +252,9 @@ class View {
     const down = level + rb * s * flat + 26, left = cx - rb * s;
     this.line([left, level], [left, down + 4], { class: "grid" });
     measure([left, down], [cx, down], "base r " + millimetres(rb), (left + cx) / 2, down - 6);
-    const up = upper[1] - rp * s * flat - 30 - (data.gauges ? 0.4 * rp * s * Math.abs(Math.cos(this.turn[1])) : 0), edge = upper[0] + rp * s;
+    // From above it is beyond the names of the joints.
+    const far = this.turn[1] > 1.5 ? level - Math.max(rb, rp) * s - 44 : Infinity;
+    const up = Math.min(far, upper[1] - rp * s * flat - 30) - (data.gauges ? 0.4 * rp * s * Math.abs(Math.cos(this.turn[1])) : 0), edge = upper[0] + rp * s;
     this.line([edge, upper[1]], [edge, up - 4], { class: "grid" });
     this.line([upper[0], upper[1]], [upper[0], up - 4], { class: "grid" });
     measure([upper[0], up], [edge, up], "platform r " + millimetres(rp), upper[0] + rp * s / 2, up - 7);

@@ -30,17 +30,18 @@ pub fn declared(model: &Model, dir: &Path) -> Result<SpecSetpoints, Vec<Diagnost
     let mut errors = Vec::new();
     let mut waveforms = Vec::new();
     for trajectory in &task.trajectories {
-        let TrajectoryKind::Waveform { file, period, .. } = &trajectory.kind else {
+        let TrajectoryKind::Waveform { file, period, columns, .. } = &trajectory.kind else {
             waveforms.push(None);
             continue;
         };
-        let read = waveform::read(&dir.join(file), file, *period);
+        let read = waveform::read(&dir.join(file), file, *period, columns.as_deref());
         waveforms.push(read.map_err(|found| errors.extend(found)).ok().map(|(waveform, text)| {
             texts.push((file.clone(), text));
             waveform
         }));
     }
-    let steps = waveforms.iter().flatten().filter_map(corners::step);
+    let notes = waveforms.iter().flatten().flat_map(|waveform| waveform.warnings.clone());
+    let steps = waveforms.iter().flatten().filter_map(corners::step).chain(notes);
     match super::lower(model, task, &waveforms, scalar(model)) {
         Ok((setpoints, warnings)) if errors.is_empty() => Ok(SpecSetpoints {
             setpoints: Some(setpoints),

@@ -318,6 +318,12 @@ fn files_of_matlab_hdf5_and_tdms_are_the_same_record() {
     assert_eq!(swapped.drive[7].to_bits(), rows()[7][2].to_bits());
 }
 
+#[test]
+fn the_form_of_hdf5_2_is_named() {
+    let found = read(&std::fs::read(containers().join("hdf5-2.0.h5")).unwrap(), &[], None).unwrap_err();
+    assert!(found[0].code == "E0503" && found[0].message.contains("libver=('earliest', 'v114')"), "{found:?}");
+}
+
 /// Bytes changed and files cut short: an answer that names the file's kind and what to do, or a record.
 #[test]
 fn damaged_files_of_matlab_hdf5_and_tdms_are_answered() {

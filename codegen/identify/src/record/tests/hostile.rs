@@ -219,12 +219,20 @@ fn files_that_end_at_any_byte_are_never_half_a_record() {
         let record = read_as(&whole, &Reading::default()).unwrap();
         let step = if std::env::var_os("SPECGEN_FULL").is_some() { 1 } else { 7 };
         for end in (20..whole.len()).step_by(step) {
-            if let Ok(part) = read_as(&whole[..end], &Reading::default()) {
-                if name == "record.tdms" && ends_of_segments(&whole).contains(&end) {
+            match read_as(&whole[..end], &Reading::default()) {
+                Ok(part) if name == "record.tdms" && ends_of_segments(&whole).contains(&end) => {
                     assert!(record.time.starts_with(&part.time) && record.displacement.starts_with(&part.displacement));
-                    continue;
                 }
-                assert!(part.time == record.time && part.displacement == record.displacement, "{name}: {end} bytes");
+                Ok(part) => {
+                    let is_whole = part.time == record.time && part.displacement == record.displacement;
+                    assert!(is_whole, "{name}: {end} bytes");
+                }
+                Err(found) => {
+                    let mut codes = found.iter().map(|one| one.code).filter(|code| code.starts_with('E')).peekable();
+                    // Damaged, without some of its columns, or with few samples.
+                    let is_known = |code| matches!(code, "E0503" | "E0504" | "E0509");
+                    assert!(codes.peek().is_some() && codes.all(is_known), "{name}: {end} bytes: {found:?}");
+                }
             }
         }
     }

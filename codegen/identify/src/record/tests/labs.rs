@@ -133,6 +133,14 @@ fn numpy_gzip_and_utf_16_are_read() {
     assert_same("gzip", read(&packed, &[], None));
     let cut = read(&packed[..packed.len() / 2], &[], None).unwrap_err();
     assert!(cut[0].message.contains("cannot be unpacked"), "{cut:?}");
+    let zip = |files: &[(&str, &[u8])]| specgen_language::arrays::zipped(files.iter().copied()).unwrap();
+    assert_same("ZIP", read(&zip(&[("__MACOSX/._r.csv", b"x"), ("r.csv", plain.as_bytes())]), &[], None));
+    let found = read(&zip(&[("r.csv", plain.as_bytes()), ("s.csv", plain.as_bytes())]), &[], None).unwrap_err();
+    assert!(found[0].code == "E0503" && found[0].message.contains("a ZIP archive"), "{found:?}");
+    let mut damaged = zip(&[("r.csv", plain.as_bytes())]);
+    damaged[60] ^= 1;
+    let found = read(&damaged, &[], None).unwrap_err();
+    assert!(found[0].code == "E0503" && found[0].message.contains("`r.csv` is damaged"), "{found:?}");
     let utf16 = |to: fn(u16) -> [u8; 2]| {
         ['\u{feff}'.to_string(), plain.clone()].concat().encode_utf16().flat_map(to).collect::<Vec<u8>>()
     };
@@ -297,6 +305,12 @@ fn times_of_day_are_of_the_time_column() {
     assert_same("blank lines", read(format!("{names}\n{apart}\n").as_bytes(), &[], None));
     let record = read(clock("2024-03-04", "2024-03-07").as_bytes(), &[], None).unwrap();
     assert!(record.time.len() == 140 && note(&record).contains("stretch without, from 259200.1"), "{}", note(&record));
+    let named = clock("4-Mar-2024", "7-MAR-2024");
+    // In a column of their own.
+    for text in [named.replace("Timestamp", "Date,Time").replace(" 10:", ",10:"), named] {
+        let record = read(text.as_bytes(), &[], None).unwrap();
+        assert!(note(&record).contains("stretch without, from 259200.1"), "{}", note(&record));
+    }
     // Elsewhere they are no numbers.
     let found = read(file(names, |[t, u, _]| format!("{t},{u},0:21.35")).as_bytes(), &["time_s=1"], None).unwrap_err();
     assert!(found[0].code == "E0506" && found[0].message.contains("`0:21.35`"), "{found:?}");
@@ -315,6 +329,10 @@ fn curves_without_their_ways_back_are_refused_for_that() {
     };
     let curves: Vec<String> = (0..12).map(|k| format!("{}\n+2.0E+01,+1.0E-05\n", curve(k))).collect();
     let text = format!("MicroMag\nNForc = 12\n\n   Field       Moment\n   (Oe)         (emu)\n\n{}", curves.join("\n"));
+    let found = read(text.as_bytes(), &[], None).unwrap_err();
+    assert!(found[0].code == "E0511" && found[0].message.contains("12 curves"), "{found:?}");
+    // Without blank lines between them.
+    let text = format!("Field (Oe),Moment (emu)\n{}", (0..12).map(curve).collect::<String>());
     let found = read(text.as_bytes(), &[], None).unwrap_err();
     assert!(found[0].code == "E0511" && found[0].message.contains("12 curves"), "{found:?}");
 }

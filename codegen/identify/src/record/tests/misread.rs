@@ -36,7 +36,7 @@ fn what_could_be_read_as_something_else_is_read_right_or_refused() {
         })
     };
     let again = |comment: &str| replaced(120, &format!("{comment}\n{}", plain(NAMES).lines().nth(119).unwrap()));
-    let right: [(&str, String, &[&str]); 14] = [
+    let right: [(&str, String, &[&str]); 15] = [
         ("minus signs of typesetting", plain(NAMES).replace('-', "\u{2212}"), &[]),
         ("three decimals behind commas", small(small_names, |value| format!("{value:.3}").replace('.', ",")), &[]),
         ("whole numbers, some with a comma", small(small_names, |value| format!("{value}").replace('.', ",")), &[]),
@@ -75,6 +75,11 @@ fn what_could_be_read_as_something_else_is_read_right_or_refused() {
         ("a remark in brackets", plain("time_s,drive_V,Position (act)"), &["displacement_um=Position (act)"]),
         ("dates on one day", dated("3/4/2024"), &[]),
         (
+            "commas within names",
+            file("Run (Nr, day),Time,s,drive_V,displacement_um", |[t, u, y]| format!("7,{t},{u},{y}")),
+            &[],
+        ),
+        (
             "a name of this project beside another",
             file("time_s,drive_V,Position (nm),displacement_um", |[t, u, y]| format!("{t},{u},{},{y}", 2e3 * y)),
             &[],
@@ -85,7 +90,7 @@ fn what_could_be_read_as_something_else_is_read_right_or_refused() {
     }
     let two =
         file("time_s,drive_V,Position (um),displacement_nm", |[t, u, y]| format!("{t},{u},{},{:?}", 2.0 * y, 1e3 * y));
-    let cases: [RefusalCase; 20] = [
+    let cases: [RefusalCase; 25] = [
         (&small(small_names, |value| grouped(value, ",")), &[], None, ["E0506", "comma may divide thousands", "point"]),
         (
             &small(small_names, |value| grouped(value, ".")),
@@ -93,7 +98,39 @@ fn what_could_be_read_as_something_else_is_read_right_or_refused() {
             None,
             ["E0506", "point may divide thousands", "without"],
         ),
-        (&small(small_names, |value| grouped(value, "'")), &[], None, ["E0506", "not a number", "plain number"]),
+        (
+            &small("time_ms\tdrive_mV\tdisplacement_nm", |value| grouped(value, ".")).replace(';', "\t"),
+            &[],
+            None,
+            ["E0506", "point may divide thousands", "without"],
+        ),
+        (
+            &file("time_s,drive, filtered,displacement_um,drive_V", |[t, u, y]| format!("{t},{u},{y},{u}")),
+            &[],
+            None,
+            ["E0504", "5 names for 4 columns", "--columns time_s=1,drive_V=2,displacement_um=3"],
+        ),
+        (&small(small_names, |value| grouped(value, "'")), &[], None, ["E0506", "not a number", "between thousands"]),
+        (
+            &file("time_ms,drive_mV,displacement_nm", |[t, u, y]| {
+                [t + 2.0, u, y].map(|value| format!("\"{}.25\"", grouped(1e3 * value, ","))).join(",")
+            }),
+            &[],
+            None,
+            ["E0506", "not a number", "between thousands"],
+        ),
+        (
+            &file("time_s,Vib Velocity,drive_V\n[ s ],[ m/s ],[ V ]", |[t, u, y]| format!("{t},{y},{u}")),
+            &[],
+            None,
+            ["E0504", "`displacement_um` is missing", "`Vib Velocity [m/s]` is a rate"],
+        ),
+        (
+            &file("time_s,Position (um)", |[t, _, y]| format!("{t},{y}")),
+            &[],
+            None,
+            ["E0504", "`drive_V` is missing", "record it as well"],
+        ),
         (
             &counted(&file(NAMES, |[t, u, y]| format!("{:.0},{u:.0},{}", 1e3 * t, comma(y)))),
             &[],
