@@ -28,8 +28,8 @@ const USAGE: &str = "usage: cargo xtask COMMAND
   test --checks
           runs only the part of the full run that is neither its tests nor its board images
   mutants [MINUTES | K/N | all]: mutation tests, as samples for a given time, one sample, or all; writes tests/results.txt
-  board   SPEC [--target BOARD] [--cycles | --faults [NAME]], or --tested [--faults]: runs a board's image on an emulated board, from
-          boot to a record that replays; with times by a model of the core, with all faults, or with one
+  board   SPEC [--target BOARD] [--cycles | --commission | --faults [NAME]], or --tested [--faults]: runs a board's image on an
+          emulated board, from boot to a record that replays; with times by a model of the core, a part of a commissioning, or faults
   fuzz    [SECONDS [TARGET]]: coverage-guided fuzzing of all external inputs, 300 s per target; writes tests/results.txt;
           `fuzz keep` updates the corpus
   wheel   builds the Python package into target/wheel/dist, and tests it in a new environment

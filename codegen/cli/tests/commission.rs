@@ -60,6 +60,10 @@ fn a_step_runs_alone_is_kept_and_an_interrupt_ramps_down() {
     assert_eq!((&known["machine"], &known["steps"]["identify"]["skipped"]), (&"stage 7".into(), &"another day".into()));
     let page = folder.read("commission/commission.md");
     assert!(page.contains("machine stage 7") && page.contains("distinguishes all single faults"), "{page}");
+    for part in ["    check by hand: each cable", "    gauge 5: ", "  the amplifiers add, rms: x ", "amplifiers off: "]
+    {
+        assert!(page.contains(part), "{part}: {page}");
+    }
     assert!(run.stdout.starts_with(&page), "{run:?}");
     // Done: the next run has nothing of it to do, and the page comes from the records.
     Run::of(&mut commission(&folder, &board, &["--step", "wiring", "--yes"])).says(0, &[]);

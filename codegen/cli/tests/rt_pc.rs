@@ -23,6 +23,7 @@ use specgen::{compile, emit, target, workspace};
 use specgen_link::{Bytes, RecorderAction, Refusal, Request, WaveAction};
 use specgen_runtime::wave::{AxisWave, Settings, Shape, Tone, step_of};
 
+mod aborts;
 mod card;
 mod clients;
 mod commission;

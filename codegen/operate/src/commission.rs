@@ -16,6 +16,7 @@ mod plan;
 mod rows;
 mod spec;
 mod state;
+mod wiring;
 
 use std::fmt::Write as _;
 use std::fs;
@@ -26,7 +27,6 @@ use std::sync::atomic::Ordering;
 use serde::Serialize;
 use serde_json::Value;
 use specgen_compiler::compile::Compilation;
-use specgen_compiler::lower;
 use specgen_identify::assembled::{Drive, Kind, Plan};
 use specgen_language::files;
 use specgen_language::interrupt;
@@ -37,6 +37,7 @@ use specgen_language::ui::Ui;
 
 use crate::commands::SessionError;
 use crate::line::Line;
+pub use plan::of as planned;
 use rows::Rows;
 pub use state::Step;
 use state::{State, record};
@@ -45,7 +46,7 @@ use state::{State, record};
 const GRID: usize = 32;
 const MAINS: f64 = 50.0;
 /// Duration of a record of the noise at rest, and of its rows, s.
-const REST: [f64; 2] = [4.0, 4e-3];
+const REST: [f64; 2] = [4.0, 2e-3];
 /// Files of these records: amplifiers off, and on.
 const RESTS: [&str; 2] = ["rest-off", "rest-on"];
 
@@ -265,9 +266,6 @@ impl Work<'_> {
                     }
                     Ok(())
                 })?;
-                state.wiring = lower::describe_wiring(&compiled.model, &compiled.ir.supervision);
-                let passed = compiled.ir.supervision.wiring.as_ref().map_or("", |_| "the wiring check passed\n");
-                self.ui.progress(&format!("{passed}{}", state.wiring.trim_end()));
             }
             Step::CrossTalk | Step::Curves => self.drives(step, &self.plan(state)?)?,
             Step::Identify => {
@@ -281,7 +279,14 @@ impl Work<'_> {
                 self.powered(|machine, ui| acceptance::measure(machine, compiled, folder, ui))?;
             }
         }
-        if step.moves() { self.evaluate_step(step, state) } else { Ok(()) }
+        if step.moves() {
+            self.evaluate_step(step, state)?;
+        }
+        if step == Step::Wiring {
+            let passed = compiled.ir.supervision.wiring.as_ref().map_or("", |_| "the wiring check passed\n");
+            self.ui.progress(&format!("{passed}{}", state.wiring.trim_end()));
+        }
+        Ok(())
     }
 
     /// Drives the legs, except where there is a record.
@@ -360,8 +365,10 @@ impl Work<'_> {
         let folder = &self.options.output;
         match step {
             Step::Wiring => {
-                let read = |name: &str| Rows::read(&record(folder, name))?.rest(state.mains);
+                let readings = self.compiled.ir.supervision.readings_per_leg.unwrap_or_default();
+                let read = |name: &str| Rows::read(&record(folder, name))?.rest(state.mains, &readings);
                 state.rest = RESTS.into_iter().map(read).collect::<Result<_, _>>()?;
+                state.wiring = wiring::text(self.compiled, &self.plan(state)?, state);
             }
             Step::CrossTalk => state.cross_talk = Some(legs::cross_talk(folder, &self.plan(state)?)?),
             Step::Acceptance => state.acceptance = acceptance::figures(folder, self.compiled)?,

@@ -14,7 +14,7 @@ mod http;
 mod request;
 mod rest;
 mod samples;
-mod status;
+pub(crate) mod status;
 mod wiring;
 
 use std::cell::RefCell;

@@ -44,7 +44,7 @@ fn assembled(emitted: &Emitted, class: u64, quiet: bool) -> Machine {
 }
 
 /// |P₀ + t + R P_i − B_i| − l₀ of each leg: the kinematics to first order would be off by 10 nm.
-fn lengths(geometry: &Geometry, pose: &Six) -> Six {
+pub fn lengths(geometry: &Geometry, pose: &Six) -> Six {
     let turn = Rotation3::from_euler_angles(pose[3], pose[4], pose[5]);
     let moved = Vector3::new(pose[0], pose[1], pose[2]);
     std::array::from_fn(|leg| {
@@ -82,7 +82,7 @@ fn strokes(machine: &mut Machine, geometry: &Geometry, leg: usize, volts: f64) -
     text
 }
 
-fn measured(machine: &mut Machine, geometry: &Geometry, rest: f64, volts: f64) -> CrossTalk {
+pub fn measured(machine: &mut Machine, geometry: &Geometry, rest: f64, volts: f64) -> CrossTalk {
     let records = std::array::from_fn(|leg| {
         // The leg before creeps back.
         machine.command(4, 0, &[0.0; 6]);
@@ -94,8 +94,8 @@ fn measured(machine: &mut Machine, geometry: &Geometry, rest: f64, volts: f64) -
 
 /// What is left at a full stroke, by an independent measurement of the same machine at 90 V without noise: (I + E) B beside its
 /// diagonal. `found` is E of small strokes.
-fn left(found: &CrossTalk, whole: &CrossTalk) -> f64 {
-    let entries = found.matrix.iter().flatten().zip(whole.matrix.iter().flatten());
+pub fn left(found: &[Six; 6], whole: &[Six; 6]) -> f64 {
+    let entries = found.iter().flatten().zip(whole.iter().flatten());
     entries.fold(0.0, |most: f64, (found, whole)| most.max((found - whole).abs())) * STROKE
 }
 
@@ -108,7 +108,7 @@ fn cross_talk_is_found_on_the_assembled_machine() {
         let whole = measured(&mut assembled(&emitted, class, true), geometry, rest, 90.0);
         let found = measured(&mut assembled(&emitted, class, false), geometry, rest, 20.0);
         let before = whole.matrix.iter().flatten().fold(0.0, |most: f64, entry| most.max(entry.abs())) * STROKE;
-        let after = left(&found, &whole);
+        let after = left(&found.matrix, &whole.matrix);
         println!(
             "legs of class {class}, {rest} s apart: another leg moves by {:.0} nm at a full stroke, {:.2} nm beside E; standard error {:.1e}, residual {:.2} nm",
             before * 1e9,

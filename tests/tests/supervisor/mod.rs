@@ -4,6 +4,7 @@
 mod begin;
 pub mod bench;
 mod bits;
+mod commissioning;
 mod cross_talk;
 mod document;
 mod drive;

@@ -366,6 +366,26 @@ fn what_all_of_them_have_in_common_is_refused() {
     }
 }
 
+/// Connectors of all gauges or of all legs turned by 120°, or both: on this geometry each is refused.
+#[test]
+fn turned_connectors_are_refused() {
+    let emitted = Emitted::new("supervisor-wiring", "reference.toml", &[]);
+    let compiled = &emitted.compiled;
+    assert!(compiled.ir.supervision.wiring.as_ref().unwrap().turned.is_empty());
+    let mut supervised = Supervised::new(emitted.at_run_time());
+    let scenario = scenario(compiled, &LegParameters::reference(), 5);
+    let turned = |by: usize| -> Matrix { std::array::from_fn(|row| IDENTITY[(row + by) % 6]) };
+    for &(gauges, legs) in
+        specgen_tests::length(&[(2, 0), (0, 2)][..], &[(2, 0), (4, 0), (0, 2), (0, 4), (2, 2), (2, 4), (4, 2), (4, 4)])
+    {
+        let mut platform = Platform { rig: scenario.rig().clone(), gauges: turned(gauges), legs: turned(legs) };
+        let word = arm(&mut supervised, &mut platform, compiled).word;
+        println!("gauges turned by {gauges} places, legs by {legs}: {}", finding(word));
+        assert_eq!((word.phase, word.cause, word.amplifier_on), (FAULTED, 14, false));
+        assert_ne!(finding(word), Finding::None);
+    }
+}
+
 /// A stop in the middle of a pulse: the leg goes to rest, no further, and the machine is disarmed.
 #[test]
 fn a_stop_ends_the_pulses_at_once() {

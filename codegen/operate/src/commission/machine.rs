@@ -10,12 +10,13 @@ use specgen_language::interrupt;
 use specgen_language::outcome::Failure;
 use specgen_language::ui::Ui;
 use specgen_link::client::Port;
-use specgen_runtime::supervisor::{Phase, Request};
+use specgen_runtime::supervisor::{Finding, Phase, Request};
 
 use super::plan::MARGIN;
 use crate::command::{Command, WaitCondition};
 use crate::commands::{Operator, SessionError, lost_link};
 use crate::line::Line;
+use crate::panel::status::advice;
 
 /// Timeout of arming with the wiring check.
 const ARMING: Duration = Duration::from_secs(120);
@@ -80,7 +81,15 @@ fn is_disarmed(machine: &Machine) -> bool {
 
 /// Arms, with the wiring check; the machine then holds.
 pub(super) fn arm(machine: &mut Machine, ui: &Ui) -> Result<(), SessionError> {
-    request(machine, Request::Arm, Phase::Holding, ui)
+    request(machine, Request::Arm, Phase::Holding, ui).map_err(|error| {
+        let advice = advice(Finding::of_word(u32::from(machine.session.status().finding)));
+        match error {
+            SessionError::Fault(text) if !advice.is_empty() => {
+                SessionError::Fault(format!("{text}. {advice} Then `acknowledge`"))
+            }
+            other => other,
+        }
+    })
 }
 
 /// Arms, and begins an open drive.

@@ -43,7 +43,7 @@ pub(super) fn page(state: &State) -> String {
 }
 
 /// A length or an angle in nm or nrad.
-fn nano(axis: usize, value: f64) -> String {
+pub(super) fn nano(axis: usize, value: f64) -> String {
     format!("{:.2} {}", value * 1e9, if axis < 3 { "nm" } else { "nrad" })
 }
 

@@ -9,6 +9,8 @@ use specgen_language::outcome::Failure;
 pub(super) const MARGIN: f64 = 1.0;
 /// Time beside the drives, s: arming, noise, ramp-down, acceptance with trajectories of some seconds.
 const BESIDE: f64 = 90.0;
+/// Gain of a leg over that of the spec, at most, that the workspace is to hold.
+const LARGEST: f64 = 1.15;
 /// Part of the voltage that curves may leave out.
 const SHORT: f64 = 1e-2;
 
@@ -16,7 +18,7 @@ const SHORT: f64 = 1e-2;
 ///
 /// # Errors
 /// The spec has no platform, the grid is not possible, or a leg alone leaves the workspace.
-pub(super) fn of(compiled: &Compilation, grid: usize, mains: f64) -> Result<Plan, Failure> {
+pub fn of(compiled: &Compilation, grid: usize, mains: f64) -> Result<Plan, Failure> {
     let bench = bench(compiled, mains).ok_or_else(|| {
         Failure::Usage(format!(
             "{}: expected a spec with [control], whose six gauges see the platform",
@@ -54,13 +56,30 @@ fn bench(compiled: &Compilation, mains: f64) -> Option<Bench> {
         voltage: [low, high],
         rest: within(from + code * (to - from) / f64::from((1_u32 << model.dac.bits) - 1), [low, high]),
         slew_rate: model.actuator.slew_rate,
-        stroke: [model.actuator.leg_gain() * (high - low); 6],
+        stroke: [LARGEST * model.actuator.leg_gain() * (high - low); 6],
         jacobian: lower::leg_jacobian(&model.geometry)?,
         workspace: model.workspace.bounds().map(|bound| [-bound, bound]),
         readings,
         mains,
         slowest_mode: modes.reduce(|slowest, mode| if mode < slowest { mode } else { slowest })?,
     })
+}
+
+/// Lowest and highest reading of each gauge in all drives, m, of legs with up to the gain that they are planned for.
+pub(super) fn travel(compiled: &Compilation, plan: &Plan) -> Option<[[f64; 2]; 6]> {
+    let (readings, actuator) = (compiled.ir.supervision.readings_per_leg?, &compiled.model.actuator);
+    let gain = LARGEST * actuator.leg_gain();
+    let mut travel = [[0.0; 2]; 6];
+    for (drive, end) in plan.drives.iter().flat_map(|drive| drive.range.map(|end| (drive, end))) {
+        let legs = drive.held.iter().enumerate().map(|(leg, held)| if drive.legs.contains(&leg) { end } else { *held });
+        let legs: Vec<f64> = legs.map(|volts| gain * (volts - actuator.voltage[0])).collect();
+        for (row, [low, high]) in readings.iter().zip(&mut travel) {
+            let reading = row.iter().zip(&legs).fold(0.0, |sum, (part, leg)| sum + part * leg);
+            *low = if reading < *low { reading } else { *low };
+            *high = if reading > *high { reading } else { *high };
+        }
+    }
+    Some(travel)
 }
 
 /// A limit in place of the voltage of a code beside it.

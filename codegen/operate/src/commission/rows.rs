@@ -7,8 +7,13 @@ use specgen_language::files;
 use specgen_language::outcome::Failure;
 use specgen_language::output::unread_file;
 
-use super::state::Rest;
+use super::state::{Peak, Rest};
 use crate::place::AXES;
+
+/// A line of a spectrum is above the noise by this factor, and above this frequency, Hz: drift and creep are below.
+const ABOVE: (f64, f64) = (4.0, 2.0);
+/// Most lines of an axis.
+const LINES: usize = 2;
 
 /// Columns by name.
 pub(super) struct Rows {
@@ -44,14 +49,18 @@ impl Rows {
     /// # Errors
     /// There is none, or a gauge was not read in one of its rows.
     pub fn column(&self, name: &str) -> Result<&[f64], Failure> {
-        let found = self.names.iter().position(|known| known == name);
-        let found = found.and_then(|place| self.columns.get(place)).filter(|all| all.iter().all(|x| x.is_finite()));
-        found.map(Vec::as_slice).ok_or_else(|| {
-            Failure::Gate(format!(
-                "{}: the column {name} is missing or not whole; record it again with --again",
+        let found = self.names.iter().position(|known| known == name).and_then(|place| self.columns.get(place));
+        let column = found.ok_or_else(|| {
+            Failure::Gate(format!("{}: the column {name} is missing; record it again with --again", self.shown))
+        })?;
+        match column.iter().position(|x| !x.is_finite()) {
+            None => Ok(column),
+            Some(row) => Err(Failure::Gate(format!(
+                "{}: row {row} has no {name}: a gauge was at the end of its range, or failed; zero it, or widen sensor.range, \
+                 and record it again with --again",
                 self.shown
-            ))
-        })
+            ))),
+        }
     }
 
     /// Columns of six axes or legs; `*` in the name is their number.
@@ -88,12 +97,42 @@ impl Rows {
         Ok(errors)
     }
 
-    /// Noise at rest, with the amplitude at `mains`, Hz.
-    pub fn rest(&self, mains: f64) -> Result<Rest, Failure> {
+    /// Noise at rest, with the amplitude at `mains`, Hz. `readings`: of each gauge (rows) per displacement of a leg.
+    pub fn rest(&self, mains: f64, readings: &[[f64; 6]; 6]) -> Result<Rest, Failure> {
         let (time, errors) = (self.time()?, self.errors([0.0, f64::INFINITY])?);
         let still = errors.map(|error| without_line(&time, &error));
-        Ok(Rest { rms: still.each_ref().map(|one| rms(one)), mains: still.map(|one| amplitude(&time, &one, mains)) })
+        let legs = self.legs()?.map(mean);
+        let gauge = |row: &[f64; 6]| row.iter().zip(legs).fold(0.0, |sum, (part, leg)| sum + part * leg);
+        Ok(Rest {
+            rms: still.each_ref().map(|one| rms(one)),
+            mains: still.each_ref().map(|one| amplitude(&time, one, mains)),
+            gauges: readings.each_ref().map(gauge),
+            lines: still.iter().enumerate().flat_map(|(axis, one)| lines(&time, one, axis)).collect(),
+        })
     }
+}
+
+/// The strongest lines of an axis, strongest first.
+fn lines(time: &[f64], values: &[f64], axis: usize) -> Vec<Peak> {
+    let count = values.len();
+    let Some(row) = time.last().map(|last| last / (count - 1).max(1) as f64).filter(|row| *row > 0.0) else {
+        return Vec::new();
+    };
+    let step = 1.0 / (row * count as f64);
+    let all: Vec<f64> = (0..count / 2).map(|bin| amplitude(time, values, bin as f64 * step)).collect();
+    let floor = ABOVE.0 * 2.0 * rms(values) / (count as f64).sqrt();
+    let is_line = |bin: &usize| {
+        let own = all[*bin];
+        own > floor && own >= all[bin - 1] && all.get(bin + 1).is_none_or(|next| own > *next)
+    };
+    let first = libm::ceil(ABOVE.1 / step) as usize;
+    let mut found: Vec<Peak> = (first.max(1)..all.len())
+        .filter(is_line)
+        .map(|bin| Peak { axis, frequency: bin as f64 * step, amplitude: all[bin] })
+        .collect();
+    found.sort_by(|a, b| b.amplitude.total_cmp(&a.amplitude));
+    found.truncate(LINES);
+    found
 }
 
 /// Root mean square.
@@ -111,11 +150,15 @@ fn without_line(time: &[f64], values: &[f64]) -> Vec<f64> {
     time.iter().zip(values).map(|(t, x)| x - level - slope * (t - middle)).collect()
 }
 
-/// Amplitude at a frequency (Hz) of values over many of its periods.
+/// Amplitude at a frequency (Hz) of values over many of its periods, at equal times.
 fn amplitude(time: &[f64], values: &[f64], frequency: f64) -> f64 {
-    let sums = time.iter().zip(values).fold([0.0; 2], |[sine, cosine], (t, x)| {
-        let phase = core::f64::consts::TAU * frequency * t;
-        [sine + x * libm::sin(phase), cosine + x * libm::cos(phase)]
+    let row = time.get(1).copied().unwrap_or_default();
+    let (sine, cosine) = libm::sincos(core::f64::consts::TAU * frequency * row);
+    let mut turn = [1.0, 0.0];
+    let sums = values.iter().fold([0.0; 2], |[real, imaginary], x| {
+        let [c, s] = turn;
+        turn = [c * cosine - s * sine, s * cosine + c * sine];
+        [real + x * c, imaginary + x * s]
     });
     2.0 / values.len() as f64 * libm::hypot(sums[0], sums[1])
 }
@@ -130,20 +173,24 @@ mod tests {
         let path = folder.path().join("rest.csv");
         let title =
             |of: &str| (0..6).map(|k| format!(",{of}[{k}]_{}", if k < 3 { "m" } else { "rad" })).collect::<String>();
-        let mut text = format!("time_s{}{}\n", title("pose"), title("target"));
+        let legs = (0..6).map(|k| format!(",leg[{k}]_m")).collect::<String>();
+        let mut text = format!("time_s{}{}{legs}\n", title("pose"), title("target"));
         for row in 0..1000 {
             let time = 7.0 + f64::from(row) * 4e-3;
             let noise = if row % 2 == 0 { 2e-9 } else { -2e-9 };
             let hum = 5e-9 * libm::sin(core::f64::consts::TAU * 50.0 * time + 0.3);
             let pose = 1e-6 + 3e-9 * time + noise + hum;
-            text += &format!("{time}{}{}\n", format!(",{pose:e}").repeat(6), ",1e-6".repeat(6));
+            text += &format!("{time}{}{}{}\n", format!(",{pose:e}").repeat(6), ",1e-6".repeat(6), ",2e-7".repeat(6));
         }
         std::fs::write(&path, &text).unwrap();
-        let rest = Rows::read(&path).unwrap().rest(50.0).unwrap();
+        let rest = Rows::read(&path).unwrap().rest(50.0, &[[0.5; 6]; 6]).unwrap();
+        assert!((rest.gauges[3] - 6e-7).abs() < 1e-12, "{rest:?}");
+        let seen: Vec<(usize, f64)> = rest.lines.iter().map(|line| (line.axis, line.frequency)).collect();
+        assert_eq!(seen, [0, 1, 2, 3, 4, 5].map(|axis| (axis, 50.0)), "{rest:?}");
         assert!((rest.mains[0] - 5e-9).abs() < 1e-11, "{rest:?}");
         assert!((rest.rms[5] - 16.5e-9_f64.sqrt() * 1e-9_f64.sqrt()).abs() < 2e-11, "{rest:?}");
         std::fs::write(&path, text.replacen("1e-6", "nan", 1)).unwrap();
         let error = Rows::read(&path).unwrap().errors([0.0, 1.0]).unwrap_err().message();
-        assert!(error.contains("is missing or not whole"), "{error}");
+        assert!(error.contains("row 0 has no target[0]_m: a gauge was at the end of its range"), "{error}");
     }
 }

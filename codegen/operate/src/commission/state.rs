@@ -89,6 +89,22 @@ pub(super) struct Rest {
     pub rms: [f64; 6],
     /// Amplitude at the frequency of the mains.
     pub mains: [f64; 6],
+    /// Mean of each gauge, m.
+    #[serde(default)]
+    pub gauges: [f64; 6],
+    /// The strongest lines of each axis.
+    #[serde(default)]
+    pub lines: Vec<Peak>,
+}
+
+/// A line of a spectrum.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub(super) struct Peak {
+    pub axis: usize,
+    /// Hz.
+    pub frequency: f64,
+    /// m or rad.
+    pub amplitude: f64,
 }
 
 /// E of the legs.
@@ -148,7 +164,7 @@ pub(super) struct State {
     /// Gain of a leg in the first spec, m/V.
     pub spec_gain: f64,
     pub steps: BTreeMap<Step, Passed>,
-    /// What the wiring check compares, and what it cannot see on this geometry.
+    /// What the wiring check compares and cannot see on this geometry, gauges, and noise.
     #[serde(default)]
     pub wiring: String,
     /// With the amplifiers off, and on.

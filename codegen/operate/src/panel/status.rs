@@ -82,7 +82,7 @@ pub fn advice(finding: Finding) -> &'static str {
             "Check the amplifiers' gain and `dac.range`, `sensor.range` or its calibration, and `actuator.stroke`."
         }
         Finding::Unexplained => {
-            "If something shakes the machine, stop that or raise `wiring_check.amplitude`. Otherwise check gauge by gauge and leg by leg, with the others unplugged."
+            "If something shakes the machine, stop that or raise `wiring_check.amplitude`. Otherwise look for a connector that is turned, then check gauge by gauge and leg by leg, with the others unplugged."
         }
         Finding::NoRoom => "Widen `code_min` and `code_max`.",
         Finding::TooSlow => "Raise `max_step_codes`.",

@@ -2,6 +2,7 @@
 //!
 //! Four processes: the emulated board, `specgen plant` with the machine, `specgen operate` as host, and this.
 
+mod commission;
 mod faults;
 mod session;
 mod triggers;
@@ -53,9 +54,13 @@ struct Trial {
     cycles: bool,
 }
 
-/// `cargo xtask board SPEC [--target BOARD] [--cycles | --faults [NAME]]`, or `--tested [--faults]` for the images that the
+/// `cargo xtask board SPEC [--target BOARD] [--cycles | --commission | --faults [NAME]]`, or `--tested [--faults]` for the images that the
 /// tests built; none if the arguments are something else.
 pub fn command(root: &Path, arguments: &[&str]) -> Option<ExitCode> {
+    let (arguments, only) = match arguments {
+        [rest @ .., "--commission"] => (rest, true),
+        all => (all, false),
+    };
     let (arguments, with_faults, fault, cycles) = match arguments {
         [rest @ .., "--faults"] => (rest, true, None, false),
         [rest @ .., "--faults", name] if faults::is_known(name) => (rest, true, Some(*name), false),
@@ -63,7 +68,7 @@ pub fn command(root: &Path, arguments: &[&str]) -> Option<ExitCode> {
         all => (all, false, None, false),
     };
     let (spec, target) = match *arguments {
-        ["--tested"] => return Some(tested(root, with_faults)),
+        ["--tested"] if !only => return Some(tested(root, with_faults)),
         [option, ..] if option.starts_with('-') => return None,
         [spec] => (spec, BOARDS[0].folder),
         [spec, "--target", name] => (spec, BOARDS.iter().find(|board| board.folder == name)?.folder),
@@ -82,7 +87,9 @@ pub fn command(root: &Path, arguments: &[&str]) -> Option<ExitCode> {
     report.step("the tool, the engine and specgen", || built(root, &[SPECGEN, TOOL]));
     report.step("the image", || image(&trial));
     if !report.has_failed() {
-        if let Some(name) = fault {
+        if only {
+            report.step("a part of a commissioning", || outcome(commission::run(&trial)));
+        } else if let Some(name) = fault {
             report.step("a fault", || outcome(faults::run(&trial, Some(name))));
         } else {
             report.step("from boot to a record that replays", || outcome(run(&trial, false)));
@@ -114,6 +121,7 @@ pub fn long(root: &Path) -> Outcome {
     each(root, &[SPECGEN, TOOL], |trial| {
         run(trial, false)?;
         run(&Trial { cycles: true, ..trial.clone() }, false)?;
+        commission::run(trial)?;
         faults::run(trial, None)?;
         wiring::run(trial)
     })

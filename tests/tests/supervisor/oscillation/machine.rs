@@ -59,6 +59,8 @@ pub struct Machine {
     pub vibration: Option<Box<dyn Fn(f64) -> Six>>,
     /// Added to what the gauges show in the next tick, m.
     pub wrong: Option<Six>,
+    /// What the gauges show per what they would show as the spec says.
+    pub shows: Option<[Six; 6]>,
     /// Rows of the last tick.
     pub input: Vec<u64>,
     pub output: Vec<u64>,
@@ -83,6 +85,7 @@ struct Places {
     pose: usize,
     target: usize,
     status: usize,
+    code: usize,
 }
 
 impl Machine {
@@ -103,6 +106,7 @@ impl Machine {
             pose: at(&outputs, "pose[0]"),
             target: at(&outputs, "target[0]"),
             status: at(&outputs, "status"),
+            code: at(&outputs, "dac_code[0]"),
         };
         let rows = compiled.ir.supervision.readings_per_leg.expect("a platform");
         let jacobian = specgen::lower::leg_jacobian(&model.geometry).expect("a platform");
@@ -115,6 +119,7 @@ impl Machine {
             structure: None,
             vibration: None,
             wrong: None,
+            shows: None,
             input: vec![0; inputs.len()],
             output: vec![0; outputs.len()],
             word: MachineWord::of(0),
@@ -198,6 +203,9 @@ impl Machine {
                 *seen += wrong;
             }
         }
+        if let Some(shows) = &self.shows {
+            seen = shows.map(|row| row.iter().zip(&seen).map(|(part, one)| part * one).sum());
+        }
         seen
     }
 
@@ -236,6 +244,10 @@ impl Machine {
 
     pub fn status(&self) -> u64 {
         self.output[self.places.status]
+    }
+
+    pub fn codes(&self) -> [i64; 6] {
+        std::array::from_fn(|leg| self.output[self.places.code + leg] as i64)
     }
 
     pub fn conditions(&self) -> u64 {
