@@ -19,6 +19,7 @@ mod families;
 mod family;
 mod file;
 mod fit;
+mod sums;
 
 use serde::{Deserialize, Serialize};
 

@@ -1,12 +1,11 @@
 //! Variable projection: one family on the samples of one record.
 
-use core::array::from_fn;
-
 use nalgebra::DMatrix;
 use specgen_language::interrupt;
 use specgen_numerics::simplex;
 
 use super::family::{Family, TIMES};
+use super::sums::{Rows, add_products};
 use crate::mixed;
 use crate::staircase::saturate;
 use crate::statistics::mean;
@@ -27,8 +26,6 @@ const STARTS: usize = 3;
 const RIDGE: f64 = 1e-10;
 /// Evaluations of a search for each unknown: from the fixed start, and from the solution on all curves.
 const SEARCH: [usize; 2] = [45, 15];
-/// Samples that are summed at once: their sums are read and written once.
-const LANES: usize = 4;
 
 /// A record for the fit: at most some thousand samples.
 pub(super) struct Samples {
@@ -102,6 +99,9 @@ impl Samples {
 
     /// The h whose creep gives y; at rest at the first sample of each record.
     pub(super) fn without_creep(&self, Creep { level, shares }: Creep) -> Vec<f64> {
+        if level == 0.0 {
+            return self.y.clone();
+        }
         let all_shares = shares.iter().fold(0.0, |sum, share| sum + share);
         let rest = |y: f64| y / (1.0 + level * all_shares);
         let mut h = rest(self.y.first().copied().unwrap_or(0.0));
@@ -343,17 +343,10 @@ impl<'a> Problem<'a> {
         let mut grams = vec![vec![0.0; width * width]; folds + 1];
         for (fold, span) in samples.branches(None) {
             let gram = &mut grams[fold.unwrap_or(folds)];
-            let level = level(&fixed[span.start * width..span.end * width], width, family);
-            for rows in fixed[span.start * width..span.end * width].chunks(LANES * width) {
-                let mut centred = rows.to_vec();
-                for row in centred.chunks_exact_mut(width) {
-                    row.iter_mut().zip(&level).for_each(|(value, level)| *value -= level);
-                }
-                let rows = lanes(&centred, width);
-                for (c, sums) in gram.chunks_exact_mut(width).enumerate() {
-                    accumulate(&mut sums[c..], rows.map(|row| row.map_or(0.0, |row| row[c])), rows, c);
-                }
-            }
+            let rows = Rows { values: &fixed, width }.of(&span);
+            let centred = if family.floats() { rows.centred() } else { rows.values.to_vec() };
+            let rows = Rows { values: &centred, width };
+            add_products(gram, rows, rows, true);
         }
         // Only from the diagonal on: a Gram matrix is symmetric.
         let whole = |gram: Vec<f64>| {
@@ -381,9 +374,15 @@ impl<'a> Problem<'a> {
         self.samples.drive.iter().map(advance).collect()
     }
 
-    /// Fits the linear unknowns to the samples that are not of fold `out`: coefficients, and the residual of every sample
-    /// in displacement, µm.
-    fn solve(&self, shape: &Shape, out: Option<usize>) -> Option<(Vec<f64>, Vec<f64>)> {
+    /// Sums of products of the fixed columns over the samples that are not of fold `out`.
+    fn gram(&self, out: Option<usize>) -> DMatrix<f64> {
+        let parts = self.grams.iter().enumerate().filter(|(fold, _)| out != Some(*fold));
+        parts.fold(DMatrix::zeros(self.width, self.width), |sum, (_, gram)| sum + gram)
+    }
+
+    /// Fits the linear unknowns to the samples that are not of fold `out`, of which the `fixed` columns have these sums of products:
+    /// coefficients, and the residual of every sample in displacement, µm.
+    fn solve(&self, shape: &Shape, out: Option<usize>, fixed: &DMatrix<f64>) -> Option<(Vec<f64>, Vec<f64>)> {
         let samples = self.samples;
         let h = samples.without_creep(shape.creep);
         let state = if self.family.has_state() { self.state(shape) } else { Vec::new() };
@@ -391,36 +390,26 @@ impl<'a> Problem<'a> {
         let powers = self.family.powers();
         // Own columns of a sample: −z, then those of the read-out, then h itself.
         let count = states + powers + 1;
-        let own = |k: usize, row: &mut Vec<f64>| {
-            row.clear();
-            row.extend(state.get(k).map(|z| -z));
-            let x = h[k] / self.unit;
+        let mut own = Vec::with_capacity(count * h.len());
+        for (k, h) in h.iter().enumerate() {
+            own.extend(state.get(k).map(|z| -z));
+            let x = h / self.unit;
             let mut power = x;
             for _ in 0..powers {
                 power *= x;
-                row.push(self.unit * (x - power));
+                own.push(self.unit * (x - power));
             }
-            row.push(h[k]);
-        };
+            own.push(*h);
+        }
+        let (columns, own) = (Rows { values: &self.fixed, width: self.width }, Rows { values: &own, width: count });
         let (mut cross, mut square) = (vec![0.0; count * self.width], vec![0.0; count * count]);
-        let mut row = Vec::new();
         for (_, span) in samples.branches(out) {
-            let mut all = Vec::with_capacity(count * span.len());
-            for k in span.clone() {
-                own(k, &mut row);
-                all.extend(&row);
-            }
-            let level = level(&all, count, self.family);
-            let fixed = self.fixed[span.start * self.width..span.end * self.width].chunks(LANES * self.width);
             // One centred factor is enough.
-            for (fixed, own) in fixed.zip(all.chunks(LANES * count)) {
-                let (fixed, own) = (lanes(fixed, self.width), lanes(own, count));
-                for (a, level) in level.iter().enumerate() {
-                    let centred = own.map(|row| row.map_or(0.0, |row| row[a] - level));
-                    accumulate(&mut cross[a * self.width..(a + 1) * self.width], centred, fixed, 0);
-                    accumulate(&mut square[a * count..(a + 1) * count], centred, own, 0);
-                }
-            }
+            let own = own.of(&span);
+            let centred = self.family.floats().then(|| own.centred());
+            let weights = Rows { values: centred.as_deref().unwrap_or(own.values), ..own };
+            add_products(&mut cross, weights, columns.of(&span), false);
+            add_products(&mut square, weights, own, false);
         }
         // In the order of the solution, a fixed column or an own one.
         let size = self.width + count - 1;
@@ -430,12 +419,8 @@ impl<'a> Problem<'a> {
             k if k < self.width + states => Ok(k - states),
             k => Err(k - self.width),
         };
-        let fixed_gram = |r: usize, c: usize| {
-            let parts = self.grams.iter().enumerate().filter(|(fold, _)| out != Some(*fold));
-            parts.fold(0.0, |sum, (_, gram)| sum + gram[(r, c)])
-        };
         let mut gram = DMatrix::from_fn(size, size, |r, c| match (place(r), place(c)) {
-            (Ok(r), Ok(c)) => fixed_gram(r, c),
+            (Ok(r), Ok(c)) => fixed[(r, c)],
             (Ok(f), Err(o)) | (Err(o), Ok(f)) => cross[o * self.width + f],
             (Err(r), Err(c)) => square[r * count + c],
         });
@@ -458,14 +443,13 @@ impl<'a> Problem<'a> {
         }
         let mut values = mixed::solve(&gram, &rhs, self.bounded + states).ok()?;
         values.iter_mut().zip(&scale).for_each(|(value, scale)| *value *= scale * energy);
-        let mut residual = Vec::with_capacity(h.len());
-        for (k, fixed) in self.fixed.chunks_exact(self.width).enumerate() {
-            own(k, &mut row);
-            let mut sum = -h[k];
-            for (at, value) in values.iter().enumerate() {
-                sum += value * place(at).map_or_else(|o| row[o], |f| fixed[f]);
-            }
-            residual.push(sum);
+        let mut residual: Vec<f64> = h.iter().map(|h| -h).collect();
+        let (bounded, all) = (self.bounded, self.width + states);
+        let runs = [(columns, 0..bounded), (own, bounded..one), (columns, one..all), (own, all..size)];
+        for (rows, run) in runs {
+            let carrying = run.filter(|at| values[*at] != 0.0);
+            let carrying: Vec<_> = carrying.map(|at| (place(at).unwrap_or_else(|own| own), values[at])).collect();
+            rows.add_columns(&mut residual, &carrying);
         }
         let offset = if !self.family.floats() {
             0.0
@@ -535,7 +519,8 @@ impl<'a> Problem<'a> {
             start
         } else {
             let most = SEARCH[usize::from(near.is_some())] * unknowns.len();
-            of(&simplex(&unknowns, &steps, most, |unknowns| self.mean_square(&of(unknowns), out)).0)
+            let gram = self.gram(out);
+            of(&simplex(&unknowns, &steps, most, |unknowns| self.mean_square(&of(unknowns), out, &gram)).0)
         };
         self.at(best, out)
     }
@@ -551,19 +536,20 @@ impl<'a> Problem<'a> {
             shares.iter_mut().zip(unknowns).for_each(|(share, c)| *share = saturate(*c, [0.0, MOST_CREEP / level]));
             Shape { creep: Creep { level, shares }, ..best }
         };
-        let cost = |unknowns: &[f64]| self.mean_square(&of(unknowns), None);
+        let gram = self.gram(None);
+        let cost = |unknowns: &[f64]| self.mean_square(&of(unknowns), None, &gram);
         of(&simplex(&best.creep.shares, &[0.5; TIMES.len()], SEARCH[0] * TIMES.len(), cost).0)
     }
 
     /// Mean square of what the best fit with these unknowns leaves of the samples that are not of fold `out`, µm².
-    fn mean_square(&self, shape: &Shape, out: Option<usize>) -> f64 {
+    fn mean_square(&self, shape: &Shape, out: Option<usize>, gram: &DMatrix<f64>) -> f64 {
         let left = |(_, found): (_, Vec<f64>)| self.samples.mean_square(&found, out, self.family.floats());
-        self.solve(shape, out).map_or(f64::INFINITY, left)
+        self.solve(shape, out, gram).map_or(f64::INFINITY, left)
     }
 
     /// The solution with these unknowns, over the samples that are not of fold `out`.
     pub(super) fn at(&self, shape: Shape, out: Option<usize>) -> Option<Solution> {
-        let (values, residual) = self.solve(&shape, out)?;
+        let (values, residual) = self.solve(&shape, out, &self.gram(out))?;
         let rms = self.samples.mean_square(&residual, out, self.family.floats()).sqrt();
         Some(Solution { shape, values, residual, rms })
     }
@@ -574,39 +560,6 @@ impl<'a> Problem<'a> {
         let (taken, rest) = if self.family.has_state() { (rest[0], &rest[1..]) } else { (0.0, rest) };
         (plays, taken, rest[0], &rest[self.width - self.bounded..])
     }
-}
-
-/// Up to [`LANES`] rows.
-fn lanes(rows: &[f64], width: usize) -> [Option<&[f64]>; LANES] {
-    from_fn(|n| rows.get(n * width..(n + 1) * width))
-}
-
-/// Adds each row from a column on, times its weight, to the sums, in their order.
-fn accumulate(sums: &mut [f64], weights: [f64; LANES], rows: [Option<&[f64]>; LANES], column: usize) {
-    let count = sums.len();
-    if let [Some(a), Some(b), Some(c), Some(d)] = rows.map(|row| row.map(|row| &row[column..column + count])) {
-        for k in 0..count {
-            sums[k] = sums[k] + weights[0] * a[k] + weights[1] * b[k] + weights[2] * c[k] + weights[3] * d[k];
-        }
-        return;
-    }
-    for (weight, row) in weights.iter().zip(rows.iter().flatten()) {
-        sums.iter_mut().zip(&row[column..]).for_each(|(sum, value)| *sum += weight * value);
-    }
-}
-
-/// Mean of each of `width` columns over a branch, which the fit leaves out of a family that floats.
-fn level(rows: &[f64], width: usize, family: Family) -> Vec<f64> {
-    let mut level = vec![0.0; width];
-    if !family.floats() {
-        return level;
-    }
-    for row in rows.chunks_exact(width) {
-        level.iter_mut().zip(row).for_each(|(sum, value)| *sum += value);
-    }
-    let count = (rows.len() / width) as f64;
-    level.iter_mut().for_each(|sum| *sum /= count);
-    level
 }
 
 /// z after a step of the drive, V, with β + γ and β − γ (1/V): exact on either side of 0.
