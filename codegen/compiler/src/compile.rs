@@ -25,7 +25,7 @@ use specgen_language::spec::{self, SpecSource};
 use specgen_toolchain::targets::Target;
 
 /// A spec that compiled.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct Compilation {
     /// The file as read.
     pub source: SpecSource,

@@ -17,6 +17,7 @@ mod wave;
 use specgen_language::model::MAX_GRID;
 use specgen_numerics::largest;
 
+pub use groups::SPREAD;
 use groups::{Group, Search};
 use timing::Timing;
 use wave::{Shape, Tone, Wave};
@@ -37,7 +38,7 @@ const LEAST_CURVES: usize = 4;
 const RAMP: f64 = 0.1;
 /// Length of an arbitrary record, and of its smooth start and end, s.
 const ARBITRARY: [f64; 2] = [10.0, 0.5];
-/// Tones of an arbitrary record, and the frequencies of the first and the last, Hz.
+/// Tones of an arbitrary record, and the frequencies of the first and the last, Hz: ten rows of 5 ms for a period.
 const TONES: usize = 8;
 const BAND: [f64; 2] = [0.1, 20.0];
 /// Above this frequency the amplitudes of an arbitrary record fall, Hz.
@@ -121,8 +122,8 @@ pub struct Drive {
 pub struct Plan {
     /// They begin and end with all legs at rest.
     pub drives: Vec<Drive>,
-    /// Duration, rests included, s.
-    pub seconds: f64,
+    /// Mains, Hz.
+    pub mains: f64,
     /// Sentences about ranges that had to be reduced.
     pub notes: Vec<String>,
 }
@@ -138,6 +139,12 @@ impl Drive {
     #[must_use]
     pub fn seconds(&self) -> f64 {
         f64::from(self.wave.ticks) / self.wave.tick_rate
+    }
+
+    /// Duration with the rest before it, s.
+    #[must_use]
+    pub fn duration(&self) -> f64 {
+        self.rest_before + self.seconds()
     }
 
     /// Voltage of the legs that move, V, so many ticks after the start; between ticks, too.
@@ -201,9 +208,8 @@ pub fn plan(bench: &Bench, grid: usize, pairs: bool) -> Result<Plan, String> {
         }
         drives.push(planner.arbitrary(group));
     }
-    let seconds = drives.iter().fold(0.0, |sum, drive| sum + drive.rest_before + drive.seconds());
     let notes = groups.iter().filter(|group| group.share < 1.0).map(|group| reduced(group, bench)).collect();
-    Ok(Plan { drives, seconds, notes })
+    Ok(Plan { drives, mains: bench.mains, notes })
 }
 
 fn check(bench: &Bench, grid: usize) -> Result<(), String> {
@@ -312,7 +318,8 @@ impl Planner<'_> {
         let tones = tones(seed, amplitude, SLEW * self.bench.slew_rate);
         let ticks = (ARBITRARY[0] * self.bench.tick_rate).ceil();
         let shape = Shape::Tones { tones, ticks };
-        self.drive(group, Kind::Arbitrary { seed }, shape, ARBITRARY[1])
+        let average = timing::short_row(self.bench);
+        Drive { average, ..self.drive(group, Kind::Arbitrary { seed }, shape, ARBITRARY[1]) }
     }
 
     fn drive(&self, group: &Group, kind: Kind, shape: Shape, ramp: f64) -> Drive {

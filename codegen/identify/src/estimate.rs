@@ -1,6 +1,6 @@
 //! Estimates of values of a spec from a record: what every kind of them has in common.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::findings::Findings;
 use super::signals::{self, ColumnSpec, Input, Signals};
@@ -22,7 +22,7 @@ pub struct Estimate<V> {
 }
 
 /// A parameter of a model, and its standard error.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Parameter {
     /// The value, in its unit.
     pub value: f64,

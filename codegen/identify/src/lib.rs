@@ -43,7 +43,7 @@ pub mod gains;
 pub mod gauge;
 mod grid_choice;
 mod joined;
-mod least_squares;
+pub mod least_squares;
 pub mod leg_model;
 mod limits;
 pub mod linear;

@@ -1,31 +1,39 @@
 //! `specgen commission`: from a wired machine to a verified one, with its own converters and gauges.
 //!
 //! ```text
-//! wiring ─► cross-talk ─► curves ─► identify ─► spec ─►  build, flash or restart  ─► acceptance
+//! wiring ─► response ─► cross-talk ─► curves ─► identify ─► spec ─►  build, flash or restart  ─► acceptance
 //!     records of `watch` in a folder      │         └ platform.toml                     │
 //!                                         └──────────► commission.json, commission.md ◄─┘
 //! ```
 //! `state` is what is known so far, `plan` the drives, `machine` arms and ramps down, `rows` reads records, `legs` identifies, `spec`
-//! edits, `acceptance` measures the new controller, `page` shows all of it. Every step may be the last: the next run continues.
+//! edits, `acceptance` measures the new controller by `motions` and `sensitivity`, beside `simulated` ones, `learned` learns, `health`
+//! compares later, `page` shows all of it. Every step may be the last: the next run continues.
 
 mod acceptance;
-mod legs;
+mod findings;
+mod health;
+mod learned;
+pub mod legs;
 mod machine;
+mod motions;
 mod page;
-mod plan;
+pub mod plan;
+mod response;
 mod rows;
+mod sensitivity;
+mod simulated;
 mod spec;
 mod state;
 mod wiring;
 
 use std::fmt::Write as _;
-use std::fs;
 use std::io::{self, IsTerminal};
 use std::path::{Path, PathBuf};
-use std::sync::atomic::Ordering;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use serde::Serialize;
-use serde_json::Value;
+use serde_json::{Value, json};
 use specgen_compiler::compile::Compilation;
 use specgen_identify::assembled::{Drive, Kind, Plan};
 use specgen_language::files;
@@ -37,7 +45,6 @@ use specgen_language::ui::Ui;
 
 use crate::commands::SessionError;
 use crate::line::Line;
-pub use plan::of as planned;
 use rows::Rows;
 pub use state::Step;
 use state::{State, record};
@@ -49,6 +56,8 @@ const MAINS: f64 = 50.0;
 const REST: [f64; 2] = [4.0, 2e-3];
 /// Files of these records: amplifiers off, and on.
 const RESTS: [&str; 2] = ["rest-off", "rest-on"];
+/// Names of the records of the response begin so.
+const RESPONSE: &str = "response";
 
 /// What to do.
 #[derive(Debug, Clone)]
@@ -79,6 +88,38 @@ pub struct Options {
     pub report: bool,
     /// Edit the spec in place.
     pub write: bool,
+    /// Only measure again what a machine in use may have changed in, and compare.
+    pub check: bool,
+    /// Learn the trajectories of the spec on the commissioned machine.
+    pub learn: bool,
+    /// If it is set, no further step begins.
+    pub stop: Arc<AtomicBool>,
+}
+
+/// What a commissioning has done and will do, as its folder says: `steps` with `name`, `date` and `skipped`, all empty while open, and
+/// whether the next run does it; `seconds` of machine time of that run; `findings`; `missed` figures; `next` if another controller is
+/// needed.
+///
+/// # Errors
+/// As [`run`], before anything moves.
+pub fn outlook(options: &Options, compiled: &Compilation, has_line: bool) -> Result<Value, Failure> {
+    let mut state = begun(options, new(compiled))?;
+    let commissioned = state.written.as_ref() == Some(&compiled.ir.digest);
+    let chosen = chosen(&mut state, options, commissioned);
+    let plan = plan_of(compiled, &state)?;
+    let moves = has_line && chosen.iter().any(|step| step.moves());
+    let seconds = if moves { PlanReport::new(&chosen, &plan, &state, options).seconds } else { 0.0 };
+    let step = |step: Step| {
+        let passed = state.steps.get(&step);
+        let skipped = passed.and_then(|passed| passed.skipped.clone());
+        let date = passed.map(|passed| passed.date.clone());
+        json!({ "name": step.name(), "date": date, "skipped": skipped, "next": chosen.contains(&step) })
+    };
+    let needs_other = state.written.is_some() && !commissioned && chosen.is_empty();
+    Ok(json!({
+        "steps": Step::ALL.map(step), "seconds": seconds, "findings": findings::findings(&state),
+        "missed": page::missed(&state), "other": needs_other, "page": options.output.join("commission.html").exists(),
+    }))
 }
 
 /// Commissions the machine at `line`, whose controller is that of `compiled`.
@@ -90,12 +131,21 @@ pub fn run(line: Option<Line<'_>>, options: &Options, compiled: &Compilation, ui
     let mut state = begun(options, new(compiled))?;
     let commissioned = state.written.as_ref() == Some(&compiled.ir.digest);
     let mut work = Work { line, options, compiled, ui };
+    if options.check {
+        return work.check(&state);
+    }
     if options.report {
         work.evaluate(&mut state)?;
         return work.conclude(&state);
     }
     let steps = chosen(&mut state, options, commissioned);
-    let moves = steps.iter().any(|step| step.moves());
+    let learns = options.learn && (commissioned || steps.contains(&Step::Acceptance));
+    if learns {
+        learned::check(compiled)?;
+    } else if options.learn {
+        return Err(Failure::Usage("--learn belongs to acceptance: name the commissioned spec".to_owned()));
+    }
+    let moves = learns || steps.iter().any(|step| step.moves());
     if moves && !options.plan && line.is_none() {
         return Err(Failure::Usage("name the device with --port or --socket, or give --plan".to_owned()));
     }
@@ -115,10 +165,15 @@ pub fn run(line: Option<Line<'_>>, options: &Options, compiled: &Compilation, ui
         state.pass(step, None);
         work.save(&state)?;
         // Only a run with a machine to ramp down does not end at once.
-        if moves && interrupt::heed().load(Ordering::Relaxed) {
+        if options.stop.load(Ordering::Relaxed) || moves && interrupt::heed().load(Ordering::Relaxed) {
             let message = "interrupted; the same command continues".to_owned();
             return Err(Failure::Interrupted { message, result: Value::Null });
         }
+    }
+    if let Some(line) = line.filter(|_| learns) {
+        let machine = state.machine.as_deref().unwrap_or(&state.name);
+        learned::learn(line, &options.spec, compiled, machine, &options.output, work.ui)?;
+        state.learned = learned::figures(&options.output, compiled)?;
     }
     work.conclude(&state)
 }
@@ -139,10 +194,11 @@ fn new(compiled: &Compilation) -> State {
 fn begun(options: &Options, new: State) -> Result<State, Failure> {
     let shown = options.output.display();
     let mut state = match State::read(&options.output)? {
+        None if options.report => new.of_records(&options.output),
         None => new,
-        Some(state) if state.written.as_ref() == Some(&new.spec) => state,
+        Some(state) if state.written.as_ref() == Some(&new.spec) => State { replacing: false, ..state },
         Some(_) if options.again && options.steps.is_empty() => new,
-        Some(state) if state.spec == new.spec => state,
+        Some(state) if state.spec == new.spec || state.replacing && state.name == new.name => state,
         Some(state) => {
             return Err(Failure::Gate(format!(
                 "`{shown}` has records of another spec, of digest {}: name another folder with -o, or start over with --again",
@@ -169,6 +225,10 @@ fn begun(options: &Options, new: State) -> Result<State, Failure> {
 /// machine is `commissioned`.
 fn chosen(state: &mut State, options: &Options, commissioned: bool) -> Vec<Step> {
     for (step, reason) in &options.skip {
+        // Without it, the legs of a pair cannot be distinguished.
+        if *step == Step::CrossTalk && !state.is_skipped(*step) {
+            state.forget(*step);
+        }
         state.pass(*step, Some(reason.clone()));
     }
     let named = |step: &Step| match options.steps.is_empty() {
@@ -199,6 +259,24 @@ fn writable(steps: &[Step], commissioned: bool, options: &Options) -> Result<(),
     ))
 }
 
+/// The drives of a machine that was not commissioned yet, for reversal curves of `grid` levels and this frequency of the mains, Hz.
+///
+/// # Errors
+/// As [`plan::of`].
+pub fn planned(compiled: &Compilation, grid: usize, mains: f64) -> Result<Plan, Failure> {
+    plan_of(compiled, &State { grid, mains, ..new(compiled) })
+}
+
+/// The drives of a machine, with the first spec's gain of a leg, so that a commissioned machine has the same plan.
+fn plan_of(compiled: &Compilation, state: &State) -> Result<Plan, Failure> {
+    let pairs = !state.is_skipped(Step::CrossTalk) || compiled.model.actuator.cross_talk.is_some();
+    plan::of(compiled, state.spec_gain, state.grid, state.mains, pairs)
+}
+
+fn no_line() -> Failure {
+    Failure::Usage("name the device with --port or --socket".to_owned())
+}
+
 /// What every step needs.
 struct Work<'a> {
     line: Option<Line<'a>>,
@@ -209,16 +287,18 @@ struct Work<'a> {
 
 impl Work<'_> {
     fn plan(&self, state: &State) -> Result<Plan, Failure> {
-        plan::of(self.compiled, state.grid, state.mains)
+        plan_of(self.compiled, state)
     }
 
     /// Shows what the machine will do and for how long. Returns whether it may begin: the user agrees, or need not be asked.
     fn permitted(&self, steps: &[Step], state: &State) -> Result<bool, Failure> {
-        let plan = self.plan(state)?;
-        let report = PlanReport::new(steps, &plan, state, self.options);
+        self.agreed(&PlanReport::new(steps, &self.plan(state)?, state, self.options))
+    }
+
+    fn agreed(&self, report: &PlanReport) -> Result<bool, Failure> {
         let asks = !self.options.yes && !self.ui.is_json() && io::stdin().is_terminal();
         if self.options.plan || !self.options.yes && !asks {
-            self.ui.result(&report);
+            self.ui.result(report);
             self.ui.progress("nothing was sent; --yes begins");
             return Ok(false);
         }
@@ -234,12 +314,13 @@ impl Work<'_> {
 
     /// Removes the records of steps that are measured again.
     fn clear(&self, steps: &[Step], state: &State) -> Result<(), Failure> {
+        if steps.contains(&Step::Response) {
+            response::clear(&self.options.output, RESPONSE)?;
+        }
         for drive in self.plan(state).iter().flat_map(|plan| &plan.drives) {
-            let step = if plan::is_cross_talk(drive) { Step::CrossTalk } else { Step::Curves };
             let path = record(&self.options.output, &drive.name);
-            if steps.contains(&step) && path.exists() {
-                fs::remove_file(&path)
-                    .map_err(|error| Failure::Environment(format!("could not remove `{}`: {error}", path.display())))?;
+            if steps.contains(&plan::step_of(drive)) {
+                response::remove(&path)?;
             }
         }
         Ok(())
@@ -267,16 +348,15 @@ impl Work<'_> {
                     Ok(())
                 })?;
             }
+            Step::Response => self.powered(|machine, ui| {
+                machine::drive(machine, ui)?;
+                response::measure(machine, (compiled, state.spec_gain), folder, RESPONSE, ui)
+            })?,
             Step::CrossTalk | Step::Curves => self.drives(step, &self.plan(state)?)?,
-            Step::Identify => {
-                let coupling = state.cross_talk.as_ref().map(|found| found.matrix);
-                let coupling = coupling.or(compiled.model.actuator.cross_talk).unwrap_or([[0.0; 6]; 6]);
-                let plan = self.plan(state)?;
-                state.legs = legs::identify(folder, compiled, &plan, &coupling, self.options.model, self.ui)?;
-            }
+            Step::Identify => self.identify(state)?,
             Step::Spec => self.write_spec(state)?,
             Step::Acceptance => {
-                self.powered(|machine, ui| acceptance::measure(machine, compiled, folder, ui))?;
+                self.powered(|machine, ui| acceptance::measure(machine, compiled, state, folder, ui))?;
             }
         }
         if step.moves() {
@@ -289,31 +369,46 @@ impl Work<'_> {
         Ok(())
     }
 
+    /// The model of each leg, from its records.
+    fn identify(&mut self, state: &mut State) -> Result<(), Failure> {
+        let (folder, compiled) = (&self.options.output, self.compiled);
+        let plan = self.plan(state)?;
+        let known = state.cross_talk.as_ref().map(|found| found.matrix).or(compiled.model.actuator.cross_talk);
+        if known.is_none() && plan.drives.iter().any(|drive| drive.legs.len() > 1) {
+            return Err(Failure::Gate(
+                "legs moved two at a time, and their cross-talk is unknown: add --step cross-talk".to_owned(),
+            ));
+        }
+        let response = state.response.as_ref().map(|response| &response.found);
+        let delays = std::array::from_fn(|leg| legs::delay(compiled, response, leg));
+        let bench = (&known.unwrap_or_default(), &delays);
+        let model = self.options.model;
+        let found = self.ui.during("identifying the legs", || legs::models(folder, compiled, &plan, bench, model))?;
+        // Until the spec is written again, its tables are others than those of the digest.
+        state.replacing |= state.written.as_ref() == Some(&compiled.ir.digest);
+        state.write(folder)?;
+        state.legs = legs::write(folder, compiled, &plan, found, self.ui)?;
+        Ok(())
+    }
+
     /// Drives the legs, except where there is a record.
     fn drives(&self, step: Step, plan: &Plan) -> Result<(), Failure> {
         let folder = &self.options.output;
-        let path = |name: &str| record(folder, name);
-        let all = plan.drives.iter().filter(|drive| plan::is_cross_talk(drive) == (step == Step::CrossTalk));
-        let is_open = |kind: Kind, name: &str| kind != Kind::Preconditioning && !path(name).exists();
-        let open = all.clone().filter(|drive| is_open(drive.kind, &drive.name)).count();
-        if open == 0 {
+        let path = |drive: &Drive| record(folder, &drive.name);
+        let open = plan::open(plan, &[step], |drive| path(drive).exists());
+        if open.is_empty() {
             return Ok(());
         }
+        let recorded = |drives: &[&Drive]| drives.iter().filter(|one| one.kind != Kind::Preconditioning).count();
         self.powered(|machine, ui| {
             machine::drive(machine, ui)?;
-            let (mut first, mut done) = (None, 0);
-            for drive in all {
-                if drive.kind == Kind::Preconditioning {
-                    first = Some(drive);
-                } else if is_open(drive.kind, &drive.name) {
-                    done += 1;
-                    ui.progress(&format!("{} ({done} of {open}), {:.0} s", drive.name, drive.seconds()));
-                    for one in first.take().into_iter().chain([drive]) {
-                        machine::play(machine, one, &path(&one.name), ui)?;
-                    }
-                } else {
-                    first = None;
+            for (at, drive) in open.iter().enumerate() {
+                let (done, all, name, seconds) =
+                    (recorded(&open[..=at]), recorded(&open), &drive.name, drive.seconds());
+                if drive.kind != Kind::Preconditioning {
+                    ui.progress(&format!("{name} ({done} of {all}), {seconds:.0} s"));
                 }
+                machine::play(machine, drive, &path(drive), ui)?;
             }
             Ok(())
         })
@@ -323,14 +418,14 @@ impl Work<'_> {
         &self,
         work: impl FnOnce(&mut machine::Machine, &Ui) -> Result<(), SessionError>,
     ) -> Result<(), Failure> {
-        let line = self.line.ok_or_else(|| Failure::Usage("name the device with --port or --socket".to_owned()))?;
+        let line = self.line.ok_or_else(no_line)?;
         machine::with(line, self.compiled, self.ui, |machine| work(machine, self.ui))
     }
 
     fn write_spec(&self, state: &mut State) -> Result<(), Failure> {
         let Options { output, spec: path, write, .. } = self.options;
         let source = &self.compiled.source;
-        if state.legs.is_empty() && state.cross_talk.is_none() {
+        if state.legs.is_empty() && state.cross_talk.is_none() && state.response.is_none() {
             return Err(Failure::Gate("nothing was identified that a spec could have".to_owned()));
         }
         if !write && spec::names_files(&source.text) {
@@ -344,24 +439,27 @@ impl Work<'_> {
         let dir = if *write { &source.dir } else { output };
         let (text, new) =
             self.ui.during("compiling the commissioned spec", || spec::edited(self.compiled, state, &folder, dir))?;
-        if *write {
-            if files::text(path).map_err(|unread| unread_file(path, &unread))? != source.text {
-                return Err(Failure::Gate(format!(
-                    "{} was changed meanwhile: repeat with --step spec --write",
-                    source.display_name
-                )));
-            }
-            edit_file(path, text.as_bytes())?;
-        } else {
-            write_file(&output.join("platform.toml"), text.as_bytes())?;
+        if *write && files::text(path).map_err(|unread| unread_file(path, &unread))? != source.text {
+            return Err(Failure::Gate(format!(
+                "{} was changed meanwhile: repeat with --step spec --write",
+                source.display_name
+            )));
         }
         state.written = Some(new.ir.digest);
         state.forget(Step::Acceptance);
-        Ok(())
+        if *write {
+            state.replacing = true;
+            state.write(output)?;
+            edit_file(path, text.as_bytes())?;
+            state.replacing = false;
+            return Ok(());
+        }
+        state.replacing = false;
+        write_file(&output.join("platform.toml"), text.as_bytes())
     }
 
     /// Figures of a step, from its records.
-    fn evaluate_step(&self, step: Step, state: &mut State) -> Result<(), Failure> {
+    fn evaluate_step(&mut self, step: Step, state: &mut State) -> Result<(), Failure> {
         let folder = &self.options.output;
         match step {
             Step::Wiring => {
@@ -370,20 +468,34 @@ impl Work<'_> {
                 state.rest = RESTS.into_iter().map(read).collect::<Result<_, _>>()?;
                 state.wiring = wiring::text(self.compiled, &self.plan(state)?, state);
             }
+            Step::Response => {
+                let date = state.steps.get(&step).map_or_else(state::today, |passed| passed.date.clone());
+                let found = self
+                    .ui
+                    .during("fitting the response", || response::found(folder, RESPONSE, self.compiled, &date))?;
+                found.agreement.iter().for_each(|sentence| self.ui.progress(sentence));
+                state.response = Some(found);
+            }
             Step::CrossTalk => state.cross_talk = Some(legs::cross_talk(folder, &self.plan(state)?)?),
-            Step::Acceptance => state.acceptance = acceptance::figures(folder, self.compiled)?,
+            Step::Acceptance => {
+                acceptance::evaluate(folder, self.compiled, state, self.ui)?;
+                state.learned = learned::figures(folder, self.compiled)?;
+            }
+            Step::Identify if state.legs.is_empty() => self.identify(state)?,
             Step::Curves | Step::Identify | Step::Spec => {}
         }
         Ok(())
     }
 
     /// The same of all steps that were done.
-    fn evaluate(&self, state: &mut State) -> Result<(), Failure> {
+    fn evaluate(&mut self, state: &mut State) -> Result<(), Failure> {
         // Figures of the commissioned controller have its limits.
         let other = state.written.as_ref().is_some_and(|written| *written != self.compiled.ir.digest);
+        // The response is compared with the first spec.
+        let void = if other { Step::Acceptance } else { Step::Response };
         let done = |step: &Step| {
             state.steps.get(step).is_some_and(|passed| passed.skipped.is_none())
-                && !(other && *step == Step::Acceptance)
+                && !(state.written.is_some() && *step == void)
         };
         let steps: Vec<Step> = Step::ALL.into_iter().filter(done).collect();
         steps.into_iter().try_for_each(|step| self.evaluate_step(step, state))
@@ -408,31 +520,40 @@ struct PlanReport {
     /// Of all steps that are named here, s.
     seconds: f64,
     drives: usize,
+    /// Legs that fit move together.
+    pairs: bool,
     grid: usize,
     mains: f64,
 }
 
 impl PlanReport {
+    /// Of a check.
+    fn check(state: &State) -> Self {
+        let seconds = response::seconds() + plan::seconds(&[Step::Wiring], &[]);
+        let (grid, mains) = (state.grid, state.mains);
+        Self { steps: vec![Step::Response.name()], seconds, drives: 0, pairs: false, grid, mains }
+    }
+
     fn new(steps: &[Step], plan: &Plan, state: &State, Options { again, output, .. }: &Options) -> Self {
-        let step = |drive: &Drive| if plan::is_cross_talk(drive) { Step::CrossTalk } else { Step::Curves };
-        let is_kept = |drive: &Drive| !again && record(output, &drive.name).exists();
-        let is_open = |drive: &&Drive| steps.contains(&step(drive)) && !is_kept(drive);
-        let drives: Vec<_> = plan.drives.iter().filter(is_open).collect();
-        let seconds = plan::seconds(&drives);
+        let open = plan::open(plan, steps, |drive| !again && record(output, &drive.name).exists());
+        let seconds = plan::seconds(steps, &open);
+        let drives = open.iter().filter(|drive| drive.kind != Kind::Preconditioning).count();
+        let pairs = open.iter().any(|drive| drive.legs.len() > 1);
         let steps = steps.iter().map(|step| step.name()).collect();
-        Self { steps, seconds, drives: drives.len(), grid: state.grid, mains: state.mains }
+        Self { steps, seconds, drives, pairs, grid: state.grid, mains: state.mains }
     }
 }
 
 impl Outcome for PlanReport {
     fn text(&self) -> String {
-        let Self { steps, seconds, drives, grid, mains } = self;
+        let Self { steps, seconds, drives, pairs, grid, mains } = self;
+        let legs = if *pairs { "one leg or two" } else { "one leg" };
         let mut text = format!("steps {}: about {:.1} min of machine time\n", steps.join(", "), seconds / 60.0);
         if *drives > 0 {
             // Writing to a String cannot fail.
             let _ = writeln!(
                 text,
-                "{drives} drives of one leg at a time, {grid} reversal curves of a leg over actuator.voltage, mains {mains} Hz; the \
+                "{drives} drives of {legs} at a time, {grid} reversal curves of a leg over actuator.voltage, mains {mains} Hz; the \
                  platform stays within its workspace"
             );
         }
@@ -480,6 +601,9 @@ mod tests {
             yes: true,
             report: false,
             write: false,
+            check: false,
+            learn: false,
+            stop: Arc::default(),
         }
     }
 
@@ -492,14 +616,16 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let all = options(folder.path());
         let mut state = State::default();
-        let before = ["wiring", "cross-talk", "curves", "identify", "spec"];
+        let before = ["wiring", "response", "cross-talk", "curves", "identify", "spec"];
         assert_eq!(names(&chosen(&mut state, &all, false)), before);
         assert_eq!(names(&chosen(&mut state, &all, true)), ["acceptance"]);
-        state.pass(Step::Wiring, None);
-        state.pass(Step::Curves, None);
+        [Step::Wiring, Step::Response, Step::Curves].into_iter().for_each(|step| state.pass(step, None));
         let skip = Options { skip: vec![(Step::CrossTalk, "soft joints".to_owned())], ..all.clone() };
-        assert_eq!(names(&chosen(&mut state, &skip, false)), ["identify", "spec"]);
-        assert_eq!(names(&chosen(&mut state, &all, false)), ["identify", "spec"], "it stays skipped");
+        assert_eq!(names(&chosen(&mut state, &skip, false)), ["curves", "identify", "spec"], "without pairs");
+        state.pass(Step::Curves, None);
+        for options in [&skip, &all] {
+            assert_eq!(names(&chosen(&mut state, options, false)), ["identify", "spec"], "it stays skipped");
+        }
         state.pass(Step::Identify, None);
         let one = Options { steps: vec![Step::Curves], ..all.clone() };
         assert!(chosen(&mut state, &one, false).is_empty());
@@ -526,6 +652,12 @@ mod tests {
         }
         let why = begun(&all, new("c")).unwrap_err().message();
         assert!(why.contains("has records of another spec, of digest a"), "{why}");
+        // Killed while the tables that the spec names were replaced: its digest is another one.
+        let killed = State { replacing: true, ..state.clone() };
+        killed.write(folder.path()).unwrap();
+        assert_eq!(begun(&all, new("c")).unwrap(), killed);
+        assert!(begun(&all, State { name: "other".to_owned(), ..new("c") }).is_err());
+        state.write(folder.path()).unwrap();
         let again = Options { again: true, ..all.clone() };
         assert_eq!(begun(&again, new("c")).unwrap(), new("c"));
         let finer = Options { grid: Some(64), ..all };

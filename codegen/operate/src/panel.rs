@@ -9,6 +9,7 @@
 
 mod browser;
 mod clients;
+mod commissioning;
 mod control;
 mod http;
 mod request;
@@ -39,6 +40,8 @@ use crate::commands::{MachineStatus, Operator, Pulse, Service, SessionError, is_
 use crate::samples::Block;
 use crate::session::Session;
 use clients::{Clients, now};
+pub use commissioning::Commissioning;
+use commissioning::Runner;
 use control::{carry_out, queries};
 use rest::RestError;
 use status::StatusMessage;
@@ -79,6 +82,7 @@ struct Panel {
     known: Value,
     check: Value,
     wave: Value,
+    commissioning: Option<Runner>,
     /// Error of a machine that runs at rest.
     rest: RestError,
 }
@@ -96,7 +100,19 @@ struct State<'a> {
     known: &'a Value,
     check: &'a Value,
     wave: &'a Value,
+    /// None without a folder for it.
+    commission: Value,
     busy: bool,
+}
+
+/// What the panel serves, and where.
+pub struct Site {
+    /// Address for browsers.
+    pub listen: SocketAddr,
+    /// The page.
+    pub page: String,
+    /// A commissioning that pages may begin.
+    pub commissioning: Option<Commissioning>,
 }
 
 /// Facts about the device for the page: its name, the rate of a ramp-down (V/s), the trajectories.
@@ -116,7 +132,7 @@ pub fn device_facts(
     Ok([("device", json!(name)), ("ramp", json!(ramp)), ("trajectories", json!(motion.trajectories()))])
 }
 
-/// Serves `page` at an address until Ctrl-C, and operates the machine as the pages request; then ramps down. If the link breaks, it
+/// Serves a page at an address until Ctrl-C, and operates the machine as the pages request; then ramps down. If the link breaks, it
 /// calls `reopen` until the machine answers again.
 ///
 /// # Errors
@@ -126,14 +142,15 @@ pub fn serve<P: Port + 'static>(
     reopen: impl Fn() -> Result<Session<P>, Failure>,
     name: &str,
     compiled: Compilation,
-    listen: SocketAddr,
-    page: String,
+    Site { listen, page, commissioning }: Site,
     ui: &Ui,
 ) -> Result<Service, Failure> {
     let refused = |error: io::Error| Failure::Environment(format!("cannot listen at {listen}: {error}"));
     let listener = TcpListener::bind(listen).map_err(refused)?;
     let address = listener.local_addr().map_err(refused)?;
-    let guard = http::Guard::new(address.port()).map_err(refused)?;
+    let commissioning = commissioning.map(Runner::new);
+    let mut guard = http::Guard::new(address.port()).map_err(refused)?;
+    guard.result = commissioning.as_ref().map(Runner::page);
     announce(name, address, guard.token(), ui);
     let (sender, events) = sync_channel(256);
     browser::serve(listener, guard, page, sender);
@@ -143,6 +160,7 @@ pub fn serve<P: Port + 'static>(
     operator.alike = compiled.ir.supervision.alike().to_vec();
     operator.attended = true;
     let panel = Rc::new(RefCell::new(Panel::new(Clients::new(events), compiled)));
+    panel.borrow_mut().commissioning = commissioning;
     panel.borrow_mut().begin(&mut operator.session).map_err(|error| match error {
         ClientError::Refused(_) => {
             let what = "the device sends no samples; build and flash it with this specgen";
@@ -167,6 +185,8 @@ pub fn serve<P: Port + 'static>(
         }
     };
     operator.pulse = None;
+    // A commissioning ends with its machine ramped down.
+    drop(panel.borrow_mut().commissioning.take());
     let left = match ending {
         SessionError::Failed(failure) => Err(failure),
         _ if operator.is_powered() => operator.ramp_down(ui).map_err(|error| lost_link(name, &error)),
@@ -283,8 +303,14 @@ impl Panel {
             known: json!({}),
             check: Value::Null,
             wave: Value::Null,
+            commissioning: None,
             rest: RestError::default(),
         }
+    }
+
+    /// Whether another command has the machine.
+    fn is_commissioning(&self) -> bool {
+        self.commissioning.as_ref().is_some_and(Runner::runs)
     }
 
     /// Waits for a new session while the link is broken, and tells the pages; none after Ctrl-C. Commands of pages are refused, but a
@@ -357,6 +383,7 @@ impl Panel {
     fn pulse<P: Port>(&mut self, operator: &mut Operator<P>) -> Result<(), SessionError> {
         self.clients.listen(Duration::ZERO);
         if let Some((who, request)) = self.clients.urgent() {
+            self.commissioning.iter().for_each(Runner::stop);
             operator.in_control = true;
             let sent = operator.session.supervise(request).map_err(SessionError::from);
             // One that a broken link kept back is sent after reconnecting.
@@ -467,6 +494,13 @@ impl Panel {
             return;
         }
         self.stated = Instant::now();
+        let commission = self.commissioning.as_mut().map_or(Value::Null, |runner| {
+            let (state, event) = runner.look();
+            if let Some(event) = event {
+                self.clients.note("note", &event, "", None);
+            }
+            state
+        });
         self.clients.publish(&json!(State {
             k: "state",
             t: now(),
@@ -476,6 +510,7 @@ impl Panel {
             known: &self.known,
             check: &self.check,
             wave: &self.wave,
+            commission,
             busy: self.is_busy,
         }));
     }

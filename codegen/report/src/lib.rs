@@ -15,6 +15,7 @@
 pub mod arrays;
 pub mod budget;
 pub mod chart;
+pub mod commission;
 pub mod drawing;
 pub mod evidence;
 pub mod first;

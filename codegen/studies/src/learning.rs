@@ -23,7 +23,7 @@ mod passes;
 mod plan;
 mod refusal;
 mod response;
-mod structure;
+pub(crate) mod structure;
 mod table;
 mod update;
 

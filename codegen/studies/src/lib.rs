@@ -7,11 +7,12 @@
 //! | [`export`] | the controller as C library, Python module and FMI unit |
 //! | [`begin`] | a new spec from a few answers |
 //! | [`controllers`], [`trajectory`], [`runs`] | which controller runs which trajectory, and errors on board |
-//! | [`machine`], [`reversal_curves`] | the simulated machine of a spec; the record of a leg |
+//! | [`machine`], [`identified`], [`reversal_curves`] | the simulated machine of a spec; with its identified legs; the record of a leg |
 //! | [`dynamics`] | M, C, G, J and leg forces at given states |
 //! | [`tuning`] | `evaluate` scores a setting on a machine and underlies every study; searches; the result as an edit of the spec |
 //! | [`factors`], [`robust`] | uncertain parameters; corners and random machines, shards, quantiles, gate |
 //! | [`learning`], [`lessons`] | iterative learning: convergence, passes, update, measured response; the command `learn` |
+//! | [`open_response`] | lag, modes and damping of a machine from sweeps of its legs in open drive |
 //! | [`lead`] | the lead of each trajectory, by the model |
 //! | [`paper`], [`reproduce`] | the paper's printed values and its experiments |
 //! | [`verdict`] | the first lines of `check`, the main command and the report |
@@ -27,10 +28,12 @@ pub mod dynamics;
 pub mod export;
 pub mod factors;
 pub mod firmware;
+pub mod identified;
 pub mod lead;
 pub mod learning;
 pub mod lessons;
 pub mod machine;
+pub mod open_response;
 pub mod paper;
 pub mod reproduce;
 pub mod reversal_curves;

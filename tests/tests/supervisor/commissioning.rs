@@ -267,6 +267,9 @@ fn commission(compiled: &Compilation, folder: &Path, (grid, model): (usize, LegM
         yes: true,
         report: false,
         write: false,
+        check: false,
+        learn: false,
+        stop: Arc::default(),
     };
     // All records are there, so that the line is not opened.
     let line = Some(Line::Socket(Path::new("no line")));
@@ -394,7 +397,10 @@ fn commissioned(number: u64, grid: usize) -> Found {
     found.left = left(&new.model.actuator.cross_talk.unwrap(), &whole.matrix);
 
     perfect_records(&drawn, &compiled, &plan, [&folder, &truth], &whole.matrix);
-    commission(&compiled, &truth, kind, &[Step::Curves, Step::Identify, Step::Spec]);
+    // Legs that move together need their cross-talk.
+    let line = "\naxial_stiffness =";
+    let coupled = text.replacen(line, &format!("\ncross_talk = {:?}{line}", whole.matrix), 1);
+    commission(&written(&truth, &coupled), &truth, kind, &[Step::Curves, Step::Identify, Step::Spec]);
     let known = fs::read_to_string(truth.join("platform.toml")).unwrap();
     let Model { amplifier, platform, actuator, .. } = &compiled.model;
     let [lag, mass, stiffness] = drawn.ratios;
@@ -405,11 +411,7 @@ fn commissioned(number: u64, grid: usize) -> Found {
         ("\ninertia        =", format!("\ninertia        = [{inertia}]")),
         (
             "\naxial_stiffness =",
-            format!(
-                "\naxial_stiffness = \"{:e} N/m\"\ncross_talk = {:?}",
-                stiffness * actuator.axial_stiffness,
-                whole.matrix
-            ),
+            format!("\naxial_stiffness = \"{:e} N/m\"", stiffness * actuator.axial_stiffness),
         ),
     ];
     let known = lines.iter().fold(known, |text, (start, line)| {

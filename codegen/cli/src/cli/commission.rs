@@ -1,6 +1,9 @@
 //! `specgen commission`: identifies a wired machine with its own converters, step by step, writes its spec, and verifies it.
 
+use std::sync::Arc;
+
 use clap::Args;
+use specgen_compiler::compile::Compilation;
 use specgen_compiler::spec_file;
 use specgen_language::model::LegModelKind;
 use specgen_language::outcome::Failure;
@@ -24,7 +27,7 @@ pub struct Arguments {
     /// Folder for records and results. An interrupted commissioning continues from it.
     #[arg(short, long, value_name = "DIR", default_value = "commission")]
     output: OutputFolder,
-    /// Do only this step: wiring, cross-talk, curves, identify, spec or acceptance. May be repeated.
+    /// Do only this step: wiring, response, cross-talk, curves, identify, spec or acceptance. May be repeated.
     #[arg(long, value_name = "STEP", value_parser = Step::parse)]
     step: Vec<Step>,
     /// Repeat all steps, or those of --step. Their records are replaced, and later steps that depend on them are to be done
@@ -54,20 +57,41 @@ pub struct Arguments {
     #[arg(long)]
     yes: bool,
     /// Move nothing: compute the figures again from the records, and write commission.md again.
-    #[arg(long, conflicts_with_all = ["plan", "yes", "step", "again", "skip"])]
+    #[arg(long, conflicts_with_all = ["plan", "yes", "step", "again", "skip", "learn"])]
     report: bool,
+    /// Measure response, gains and noise again, in two minutes, and say what has changed since the commissioning; exit code 1 if
+    /// anything has.
+    #[arg(long, conflicts_with_all = ["plan", "step", "again", "skip", "report", "write"])]
+    check: bool,
     /// Edit the spec in place, instead of writing platform.toml into the folder of the records.
     #[arg(long)]
     write: bool,
+    /// After acceptance, learn the trajectories of the spec on the machine, as `specgen learn` does.
+    #[arg(long)]
+    learn: bool,
 }
 
 pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     let options = options!(arguments => Options {
-        again skip mains model machine plan yes report write;
+        again skip mains model machine plan yes report write check learn;
         spec: arguments.spec.to_path_buf(), output: arguments.output.to_path_buf(), steps: arguments.step.clone(),
-        grid: arguments.grid.map(usize::from),
+        grid: arguments.grid.map(usize::from), stop: Arc::default(),
     });
     let line = arguments.line.is_named().then(|| arguments.line.end()).transpose()?;
     let compiled = spec_file::looked_up(&arguments.spec, ui)?;
-    commission::run(line, &options, &compiled, ui)
+    run_with_page(line, &options, &compiled, ui)
+}
+
+/// Commissions, and shows the page of the folder in HTML, too, however it ended.
+pub fn run_with_page(
+    line: Option<specgen_operate::Line<'_>>,
+    options: &Options,
+    compiled: &Compilation,
+    ui: &mut Ui,
+) -> Result<(), Failure> {
+    let done = commission::run(line, options, compiled, ui);
+    if !options.plan && !matches!(done, Err(Failure::Usage(_) | Failure::Refused(_))) {
+        specgen_report::commission::write(&options.output)?;
+    }
+    done
 }

@@ -175,6 +175,8 @@ Examples:
       repeat all steps, or with --step curves that one; later ones are due again
   specgen commission platform.toml --step spec --write  # (board)
       write the results into platform.toml itself
+  specgen commission platform.toml --socket rt.sock --check  # (board)
+      a machine in use: gains, delays, modes and noise against those kept
 
 The legs move one at a time over their whole stroke. The command asks first;
 without a terminal it needs --yes. However it ends, the machine is ramped down.";

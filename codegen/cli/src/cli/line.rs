@@ -1,5 +1,7 @@
 //! Connection options of commands that need a device.
 
+use std::path::Path;
+
 use clap::Args;
 use specgen_language::outcome::Failure;
 use specgen_link::client::Port;
@@ -26,6 +28,11 @@ impl Line {
     /// Whether a device is named.
     pub fn is_named(&self) -> bool {
         self.port.is_some() || self.socket.is_some()
+    }
+
+    /// The Unix socket, if it is one.
+    pub fn socket(&self) -> Option<&Path> {
+        self.socket.as_deref()
     }
 
     /// The line to the device.

@@ -39,6 +39,7 @@ impl Panel {
     pub fn new(spec: &Path, link: &Path) -> Self {
         let mut command = Command::new(env!("CARGO_BIN_EXE_specgen"));
         command.arg("panel").arg(spec).args(["--listen", "127.0.0.1:0", "--socket"]).arg(link);
+        command.arg("--commission").arg(link.with_extension("commission"));
         let mut process = command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
         let mut said = BufReader::new(process.stderr.take().unwrap()).lines();
         let printed =
@@ -313,6 +314,47 @@ fn pages_operate_a_machine_one_is_in_control_and_a_page_that_leaves_is_a_host_th
     }
     panel.end();
     bench.check(&running.end(Signal::TERM), "panel.rec");
+}
+
+#[test]
+#[ignore = "long: another session; every part of it alone is in the short run"]
+fn a_page_commissions_the_machine_and_ramp_down_of_another_page_ends_it() {
+    let bench = Bench::named("reference.toml", "page-commission");
+    let link = bench.path("commissioned.link");
+    let running = program(&bench, "commissioned.rec", &bench.name, &link);
+    let panel = Panel::new(&bench.spec, &link);
+    let result = format!("/commission?token={}", panel.token);
+    let mut page = panel.page();
+    page.phase("disarmed");
+    assert!(panel.get(&result, "").starts_with("HTTP/1.1 404"), "there is none yet");
+    page.refused(json!({ "do": "commission" }), "is not in control");
+    page.takes_control();
+    let steps = |state: &Value| state["commission"]["outlook"]["steps"].clone();
+    assert!(steps(&page.state).as_array().unwrap().iter().all(|step| step["date"].is_null()), "{}", page.state);
+    let seconds = page.state["commission"]["outlook"]["seconds"].as_f64().unwrap();
+    assert!((300.0..1500.0).contains(&seconds), "{seconds} s");
+    page.done(json!({ "do": "commission" }));
+    page.refused(json!({ "do": "commission" }), "being commissioned");
+    page.phase("driving");
+    page.refused(json!({ "do": "begin", "request": "acknowledge" }), "being commissioned");
+    page.wait("the first step", |state| steps(state)[0]["date"].is_string());
+    let mut other = panel.page();
+    other.phase("driving");
+    other.say(&json!({ "do": "ramp-down" }));
+    page.phase("disarmed");
+    page.wait("its end", |state| state["commission"]["runs"] == false);
+    assert!(page.state["commission"]["ended"].as_str().unwrap().contains("disarmed"), "{}", page.state);
+    assert!(page.events.iter().any(|text| text.starts_with("The commissioning ended")), "{:?}", page.events);
+    let shown = panel.get(&result, "");
+    assert!(shown.starts_with("HTTP/1.1 200") && shown.contains("Commissioning of reference"), "{shown:.300}");
+    // The machine is free for other commands, and the end of the panel ends a commissioning ramped down.
+    page.done(json!({ "do": "commission" }));
+    page.phase("driving");
+    panel.end();
+    let mut watcher = Host::open(&link, 1).unwrap();
+    assert_eq!(watcher.status().phase, super::DISARMED);
+    drop(watcher);
+    bench.check(&running.end(Signal::TERM), "commissioned.rec");
 }
 
 /// A socket in front of that of the program, whose connections can be cut.

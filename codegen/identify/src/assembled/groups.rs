@@ -12,6 +12,9 @@ use crate::staircase::saturate;
 
 /// Part of the workspace that is used. An open drive ends at 31/32; gauges and strokes are known to half a percent.
 const REACH: f64 = 0.96;
+/// The stroke of each leg may be larger or smaller than that of the spec by this factor, and a drive then still fits, if the other legs
+/// can make room for it.
+pub const SPREAD: f64 = 1.15;
 /// Time for which the supervisor of an open drive looks ahead, s.
 const AHEAD: f64 = 2e-3;
 /// Least part of its range that a leg must move.
@@ -115,7 +118,8 @@ impl<'a> Search<'a> {
         if !pairs {
             return Ok(singles);
         }
-        let pairs = (0..6).flat_map(|a| (a + 1..6).map(move |b| [a, b])).filter_map(|legs| self.group(&legs, 1.0));
+        let pairs =
+            (0..6).flat_map(|a| (a + 1..6).map(move |b| [a, b])).filter_map(|legs| self.group(&legs, 1.0, SPREAD));
         let mut best = singles.clone();
         extend(&pairs.chain(singles).collect::<Vec<_>>(), self.bench.rest, &mut Vec::new(), &mut best);
         Ok(best)
@@ -123,44 +127,68 @@ impl<'a> Search<'a> {
 
     /// Whether `legs` may go through `range` (V) while the others rest.
     pub(super) fn stays(&self, legs: &[usize], range: [f64; 2]) -> bool {
-        self.half_spaces(legs, range).iter().all(|space| space.most >= 0.0)
+        self.half_spaces(legs, range, 1.0).iter().all(|space| space.most >= 0.0)
     }
 
     /// The leg alone, over as much of its range as fits.
     fn alone(&self, leg: usize) -> Result<Group, String> {
-        let share = largest(1.0, |share| self.group(&[leg], share).is_some());
+        if let Some(group) = self.group(&[leg], 1.0, SPREAD) {
+            return Ok(group);
+        }
+        let share = largest(1.0, |share| self.group(&[leg], share, 1.0).is_some());
         let least = |group: &Group| group.share >= LEAST_SHARE;
-        self.group(&[leg], share).filter(least).ok_or_else(|| {
+        self.group(&[leg], share, 1.0).filter(least).ok_or_else(|| {
             format!("leg {leg}: {:.0} % of its range fit into the workspace; widen `workspace`", 100.0 * share)
         })
     }
 
-    /// The legs over this share of the range from rest, if that fits.
-    fn group(&self, legs: &[usize], share: f64) -> Option<Group> {
+    /// The legs over this share of the range from rest, if that fits with strokes larger by the factor `spread`.
+    fn group(&self, legs: &[usize], share: f64, spread: f64) -> Option<Group> {
         let rest = self.bench.rest;
         let range = self.permitted.map(|limit| if share < 1.0 { rest + share * (limit - rest) } else { limit });
-        let held = nearest(&self.half_spaces(legs, range))?.map(|volts| rest + volts);
+        let held = nearest(&self.half_spaces(legs, range, spread))?.map(|volts| rest + volts);
         // The search may pass a limit by its tolerance.
         let held = held.map(|volts| saturate(volts, self.permitted));
-        Some(Group { legs: legs.to_vec(), held, range, share })
+        self.holds(legs, (&held, range), spread).then(|| Group { legs: legs.to_vec(), held, range, share })
     }
 
-    /// What the voltages of the other legs, from rest, must fulfil while `legs` go through `range`.
-    fn half_spaces(&self, legs: &[usize], range: [f64; 2]) -> Vec<HalfSpace> {
+    /// Whether every limit holds while `legs` go through `range`, with the stroke of each leg larger, or smaller, by as much as `spread`
+    /// permits: the legs that make room may be those with the smaller strokes.
+    fn holds(&self, legs: &[usize], (held, range): (&[f64; 6], [f64; 2]), spread: f64) -> bool {
+        let [smaller, larger] = [2.0 - spread, spread];
+        let lowest = self.bench.voltage[0];
+        self.limits.iter().all(|limit| {
+            [range[0] - self.ahead, range[1] + self.ahead].into_iter().all(|volts| {
+                let at = |leg: usize| if legs.contains(&leg) { volts } else { held[leg] };
+                let part = |leg: usize| limit.slope[leg] * (at(leg) - lowest);
+                let most =
+                    (0..6).map(part).fold(0.0, |sum, part| sum + part * if part > 0.0 { larger } else { smaller });
+                let least =
+                    (0..6).map(part).fold(0.0, |sum, part| sum + part * if part > 0.0 { smaller } else { larger });
+                let slack = TOLERANCE * (limit.high - limit.low);
+                most <= limit.high + slack && least >= limit.low - slack
+            })
+        })
+    }
+
+    /// What the voltages of the other legs, from rest, must fulfil while `legs` go through `range`, with strokes larger by
+    /// the factor `spread`.
+    fn half_spaces(&self, legs: &[usize], range: [f64; 2], spread: f64) -> Vec<HalfSpace> {
         let (rest, lowest) = (self.bench.rest, self.bench.voltage[0]);
         let span = self.bench.voltage[1] - lowest;
         let mut all = Vec::new();
         for limit in &self.limits {
             // Relative to the size of the limit.
-            let size = 0.5 * (limit.high - limit.low);
+            let (low, high) = (limit.low / spread, limit.high / spread);
+            let size = 0.5 * (high - low);
             let of_others = |sign: f64| {
                 core::array::from_fn(|leg| if legs.contains(&leg) { 0.0 } else { sign * limit.slope[leg] / size })
             };
             for volts in [range[0] - self.ahead, range[1] + self.ahead] {
                 let at = |leg: usize| if legs.contains(&leg) { volts } else { rest };
                 let reading = (0..6).fold(0.0, |sum, leg| sum + limit.slope[leg] * (at(leg) - lowest));
-                all.push(HalfSpace { slope: of_others(1.0), most: (limit.high - reading) / size });
-                all.push(HalfSpace { slope: of_others(-1.0), most: (reading - limit.low) / size });
+                all.push(HalfSpace { slope: of_others(1.0), most: (high - reading) / size });
+                all.push(HalfSpace { slope: of_others(-1.0), most: (reading - low) / size });
             }
         }
         for leg in (0..6).filter(|leg| !legs.contains(leg)) {

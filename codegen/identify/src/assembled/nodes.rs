@@ -1,8 +1,9 @@
 //! Reversal curves at the nodes of their grid, from the means of coarse rows.
 //!
 //! A serial line carries four rows of a grid step. Between the nodes the leg is curved, and rows about a turn show
-//! neither its voltage nor its displacement. The cubic through the means of four rows gives the displacement at a node,
-//! and the whole rows of a hold that of a turn.
+//! neither its voltage nor its displacement. The cubic through the means of four rows gives the displacement at a node.
+//! A turn has two: a curve ends with the displacement as the drive arrives, and the next one begins with that at the end
+//! of the hold. Between them a leg relaxes by up to 200 nm if its hysteresis depends on the rate.
 
 use super::Drive;
 use super::wave::Shape;
@@ -23,63 +24,49 @@ impl Drive {
     /// rows are missing.
     #[must_use]
     pub fn nodes(&self, first: f64, displacement: &[f64], delay: f64, mains: f64) -> Option<[Vec<f64>; 3]> {
-        let Shape::Curves { grid, step, hold, .. } = self.wave.shape else { return None };
+        let Shape::Curves { grid, step, hold, corner } = self.wave.shape else { return None };
         let rows = step / self.average;
         if rows < ROWS || self.average > step || f64::from(self.average) * mains > 0.5 * self.wave.tick_rate {
             return None;
         }
-        let quiet = self.without_mains(first, displacement, delay, mains);
-        let later = delay * self.wave.tick_rate;
+        let volts = self.rows(first, displacement.len(), delay);
+        let quiet = self.without_mains(&volts, displacement, mains);
         let interval = (self.range[1] - self.range[0]) / f64::from(grid);
+        let voltage = |level: u32| self.range[0] + f64::from(level) * interval;
+        let place = |tick: f64| (tick + delay * self.wave.tick_rate - first - 0.5) / f64::from(self.average);
         let mut columns = [Vec::new(), Vec::new(), Vec::new()];
         let mut add = |tick: f64, level: u32, displacement: Option<f64>| {
             columns[0].push(tick / self.wave.tick_rate);
-            columns[1].push(self.range[0] + f64::from(level) * interval);
+            columns[1].push(voltage(level));
             columns[2].push(displacement?);
             Some(())
         };
-        let at = |tick: f64| self.at(&quiet, first, tick + later);
-        let held = |tick: f64| self.held_from(&quiet, first, tick + later);
+        let arrived = |tick: f64, level: u32| at_arrival(&volts, &quiet, place(tick), voltage(level));
+        let left = |tick: f64| at_departure(&quiet, place(tick - 0.5 * f64::from(corner)));
+        let [step, hold] = [step, hold].map(f64::from);
         let mut tick = f64::from(self.wave.begin());
         for curve in 1..=grid {
             for (turn, up) in [(0, true), (curve, false)] {
-                add(tick + 0.5 * f64::from(hold), turn, held(tick))?;
-                tick += f64::from(hold);
-                for passed in 1..curve {
-                    let tick = tick + f64::from(passed * step);
-                    add(tick, if up { passed } else { curve - passed }, at(tick))?;
+                if turn > 0 || curve > 1 {
+                    add(tick, turn, arrived(tick, turn))?;
                 }
-                tick += f64::from(curve * step);
+                tick += hold;
+                add(tick, turn, left(tick))?;
+                for passed in 1..curve {
+                    let tick = tick + f64::from(passed) * step;
+                    add(tick, if up { passed } else { curve - passed }, at(&quiet, place(tick)))?;
+                }
+                tick += f64::from(curve) * step;
             }
         }
-        add(tick + 0.5 * f64::from(hold), 0, held(tick))?;
+        add(tick, 0, arrived(tick, 0))?;
+        add(tick + hold, 0, left(tick + hold))?;
         Some(columns)
-    }
-
-    /// Value at a tick, from the cubic that has the means of the four rows about it.
-    fn at(&self, rows: &[f64], first: f64, tick: f64) -> Option<f64> {
-        let place = (tick - first - 0.5) / f64::from(self.average);
-        let (boundary, x) = (place.round(), place - place.round());
-        let begin = boundary as usize;
-        let [a, b, c, d] = *rows.get(begin.checked_sub(2)?..begin + 2)? else { return None };
-        let value = (7.0 * (b + c) - a - d) / 12.0;
-        let slope = (15.0 * (c - b) + a - d) / 12.0;
-        let (bend, change) = (0.5 * (a - b - c + d), d - a + 3.0 * (b - c));
-        Some(value + x * (slope + x * (0.5 * bend + x * change / 6.0)))
-    }
-
-    /// Mean of the rows that lie within the hold from this tick on, without the corners at its ends.
-    fn held_from(&self, rows: &[f64], first: f64, tick: f64) -> Option<f64> {
-        let Shape::Curves { hold, corner, .. } = self.wave.shape else { return None };
-        let place = |tick: f64| (tick - first - 0.5) / f64::from(self.average);
-        let (from, to) = (tick + 0.5 * f64::from(corner), tick + f64::from(hold) - 0.5 * f64::from(corner));
-        let rows = rows.get(place(from).ceil() as usize..place(to).floor() as usize)?;
-        Some(rows.iter().fold(0.0, |sum, row| sum + row) / rows.len() as f64).filter(|mean| mean.is_finite())
     }
 
     /// The rows less the mains, fitted every [`CONSTANT`] seconds to what rows on a straight drive depart from their mean
     /// over a period.
-    fn without_mains(&self, first: f64, displacement: &[f64], delay: f64, mains: f64) -> Vec<f64> {
+    fn without_mains(&self, volts: &[f64], displacement: &[f64], mains: f64) -> Vec<f64> {
         let seconds = f64::from(self.average) / self.wave.tick_rate;
         let half = (0.5 / (mains * seconds)).round() as usize;
         let departure = |rows: &[f64], row: usize| {
@@ -88,9 +75,8 @@ impl Drive {
             let within = own[1..2 * half].iter().fold(ends, |sum, row| sum + row);
             Some(own[half] - within / (2 * half) as f64)
         };
-        let volts = self.rows(first, displacement.len(), delay);
         let most = STRAIGHT * (self.range[1] - self.range[0]);
-        let is_straight = |row: &usize| departure(&volts, *row).is_some_and(|volts| volts.abs() < most);
+        let is_straight = |row: &usize| departure(volts, *row).is_some_and(|volts| volts.abs() < most);
         let angle = |row: usize| core::f64::consts::TAU * mains * seconds * row as f64;
         let mut quiet = displacement.to_vec();
         let block = (CONSTANT / seconds) as usize;
@@ -112,4 +98,33 @@ impl Drive {
         }
         quiet
     }
+}
+
+/// Value at a place, in rows from the first, from the cubic that has the means of the four rows about it.
+fn at(rows: &[f64], place: f64) -> Option<f64> {
+    let x = place - place.round();
+    let begin = place.round() as usize;
+    let [a, b, c, d] = *rows.get(begin.checked_sub(2)?..begin + 2)? else { return None };
+    let value = (7.0 * (b + c) - a - d) / 12.0;
+    let slope = (15.0 * (c - b) + a - d) / 12.0;
+    let (bend, change) = (0.5 * (a - b - c + d), d - a + 3.0 * (b - c));
+    Some(value + x * (slope + x * (0.5 * bend + x * change / 6.0)))
+}
+
+/// Value as the drive arrives at a turn of `volts`: of the two rows about the middle of the corner, each moved to that
+/// voltage along the line from the row before them.
+fn at_arrival(drive: &[f64], rows: &[f64], place: f64, volts: f64) -> Option<f64> {
+    let own = (place - 0.5).floor() as usize;
+    let x = place - 0.5 - own as f64;
+    let [before, first, second] = *rows.get(own.checked_sub(1)?..own + 2)? else { return None };
+    let [from, to, last] = *drive.get(own - 1..own + 2)? else { return None };
+    let moved = |drive: f64, row: f64| row + (row - before) * (volts - drive) / (drive - from);
+    Some((1.0 - x) * moved(to, first) + x * moved(last, second))
+}
+
+/// Value at the end of a hold, from the line through its last three whole rows: a leg has relaxed before them.
+fn at_departure(rows: &[f64], place: f64) -> Option<f64> {
+    let end = place.floor() as usize;
+    let [a, b, c] = *rows.get(end.checked_sub(3)?..end)? else { return None };
+    Some((a + b + c) / 3.0 + 0.5 * (c - a) * (place - (end as f64 - 1.5)))
 }

@@ -13,6 +13,9 @@ const LONG: f64 = 4.0;
 /// Periods of the slowest mode over which the slope changes: 5 ms of 361 Hz, which then rings by 2.6 nm at 156 V/s.
 const CORNER: f64 = 1.8;
 
+/// Whole rows of a hold: a leg relaxes in the first ones, the last three show its line until the next curve.
+const HELD: u32 = 6;
+
 /// Times of reversal curves.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Timing {
@@ -20,7 +23,7 @@ pub(super) struct Timing {
     pub row: u32,
     /// Ticks of a grid step, whole rows.
     pub step: u32,
-    /// Ticks for which a turn is held: two whole rows between the corners, wherever rows begin.
+    /// Ticks for which a turn is held: [`HELD`] whole rows between the corners, wherever rows begin.
     pub hold: u32,
     /// Ticks over which the slope changes.
     pub corner: u32,
@@ -45,7 +48,7 @@ impl Timing {
         };
         let corner = (CORNER / bench.slowest_mode * bench.tick_rate) as u32;
         let corner = if corner < step { corner } else { step };
-        let hold = row * (corner + 2 * row).div_ceil(row);
+        let hold = row * (corner + HELD * row).div_ceil(row);
         Self { row, step, hold, corner, tick_rate: bench.tick_rate }
     }
 
@@ -81,6 +84,11 @@ fn whole_periods(bench: &Bench, periods: f64) -> (u32, u32) {
     }
     let row = mains_row(bench);
     (row, row * first)
+}
+
+/// Ticks of the shortest row of which several last a period of the mains.
+pub(super) fn short_row(bench: &Bench) -> u32 {
+    whole_periods(bench, 1.0).0
 }
 
 /// Ticks of a row that lasts whole periods of the mains.

@@ -5,27 +5,27 @@ use specgen_compiler::lower;
 use specgen_identify::assembled::{self, Bench, Drive, Kind, Plan};
 use specgen_language::outcome::Failure;
 
+use super::response;
+use super::state::Step;
+
 /// Rest before and after a drive in its record, s.
 pub(super) const MARGIN: f64 = 1.0;
-/// Time beside the drives, s: arming, noise, ramp-down, acceptance with trajectories of some seconds.
-const BESIDE: f64 = 90.0;
-/// Gain of a leg over that of the spec, at most, that the workspace is to hold.
-const LARGEST: f64 = 1.15;
 /// Part of the voltage that curves may leave out.
 const SHORT: f64 = 1e-2;
 
-/// The drives of a platform, for reversal curves of `grid` levels and this frequency of the mains, Hz.
+/// The drives of a platform, for reversal curves of `grid` levels and this frequency of the mains, Hz. `gain`: of a leg, m/V;
+/// `pairs`: legs that fit move together, which needs their cross-talk.
 ///
 /// # Errors
 /// The spec has no platform, the grid is not possible, or a leg alone leaves the workspace.
-pub fn of(compiled: &Compilation, grid: usize, mains: f64) -> Result<Plan, Failure> {
-    let bench = bench(compiled, mains).ok_or_else(|| {
+pub fn of(compiled: &Compilation, gain: f64, grid: usize, mains: f64, pairs: bool) -> Result<Plan, Failure> {
+    let bench = bench(compiled, gain, mains).ok_or_else(|| {
         Failure::Usage(format!(
             "{}: expected a spec with [control], whose six gauges see the platform",
             compiled.ir.name
         ))
     })?;
-    let plan = assembled::plan(&bench, grid, false).map_err(Failure::Usage)?;
+    let plan = assembled::plan(&bench, grid, pairs).map_err(Failure::Usage)?;
     let [low, high] = bench.voltage;
     let whole = |drive: &&Drive| {
         let [from, to] = drive.range;
@@ -42,21 +42,19 @@ pub fn of(compiled: &Compilation, grid: usize, mains: f64) -> Result<Plan, Failu
 }
 
 /// The platform of a spec; none without one.
-fn bench(compiled: &Compilation, mains: f64) -> Option<Bench> {
+fn bench(compiled: &Compilation, gain: f64, mains: f64) -> Option<Bench> {
     let (model, design) = (&compiled.model, compiled.design.as_ref()?);
     model.task_space.as_ref()?;
     let [low, high] = model.actuator.voltage;
-    let [from, to] = model.dac.range;
-    let code = f64::from(compiled.ir.supervision.constants.rest);
     let gauges = lower::readings_per_pose(model).ok().flatten()?;
     let readings = gauges.map(|row| (row, model.sensor.range)).to_vec();
     let modes = design.modes.iter().map(|mode| mode.frequency / core::f64::consts::TAU);
     Some(Bench {
         tick_rate: 1.0 / model.timing.period,
         voltage: [low, high],
-        rest: within(from + code * (to - from) / f64::from((1_u32 << model.dac.bits) - 1), [low, high]),
+        rest: rest(compiled),
         slew_rate: model.actuator.slew_rate,
-        stroke: [LARGEST * model.actuator.leg_gain() * (high - low); 6],
+        stroke: [gain * (high - low); 6],
         jacobian: lower::leg_jacobian(&model.geometry)?,
         workspace: model.workspace.bounds().map(|bound| [-bound, bound]),
         readings,
@@ -68,7 +66,7 @@ fn bench(compiled: &Compilation, mains: f64) -> Option<Bench> {
 /// Lowest and highest reading of each gauge in all drives, m, of legs with up to the gain that they are planned for.
 pub(super) fn travel(compiled: &Compilation, plan: &Plan) -> Option<[[f64; 2]; 6]> {
     let (readings, actuator) = (compiled.ir.supervision.readings_per_leg?, &compiled.model.actuator);
-    let gain = LARGEST * actuator.leg_gain();
+    let gain = assembled::SPREAD * actuator.leg_gain();
     let mut travel = [[0.0; 2]; 6];
     for (drive, end) in plan.drives.iter().flat_map(|drive| drive.range.map(|end| (drive, end))) {
         let legs = drive.held.iter().enumerate().map(|(leg, held)| if drive.legs.contains(&leg) { end } else { *held });
@@ -82,6 +80,14 @@ pub(super) fn travel(compiled: &Compilation, plan: &Plan) -> Option<[[f64; 2]; 6
     Some(travel)
 }
 
+/// Voltage of the legs at rest, V.
+pub(super) fn rest(compiled: &Compilation) -> f64 {
+    let model = &compiled.model;
+    let [from, to] = model.dac.range;
+    let code = f64::from(compiled.ir.supervision.constants.rest);
+    within(from + code * (to - from) / f64::from((1_u32 << model.dac.bits) - 1), model.actuator.voltage)
+}
+
 /// A limit in place of the voltage of a code beside it.
 fn within(volts: f64, [low, high]: [f64; 2]) -> f64 {
     let near = 1e-3 * (high - low);
@@ -92,23 +98,74 @@ fn within(volts: f64, [low, high]: [f64; 2]) -> f64 {
     }
 }
 
-/// Time of these drives with the rests in their records, and of all beside them, s.
-pub(super) fn seconds(drives: &[&Drive]) -> f64 {
-    let of = |drive: &Drive| drive.rest_before + drive.seconds() + margins(drive);
-    drives.iter().fold(BESIDE, |sum, drive| sum + of(drive))
+/// Drives of `steps` that have no record yet, each set of curves after its preconditioning.
+pub(super) fn open<'a>(plan: &'a Plan, steps: &[Step], is_kept: impl Fn(&Drive) -> bool) -> Vec<&'a Drive> {
+    let (mut open, mut before) = (Vec::new(), None);
+    for drive in plan.drives.iter().filter(|drive| steps.contains(&step_of(drive))) {
+        let prepares = drive.kind == Kind::Preconditioning;
+        if !prepares && !is_kept(drive) {
+            open.extend(before.into_iter().chain([drive]));
+        }
+        before = prepares.then_some(drive);
+    }
+    open
 }
 
-fn margins(drive: &Drive) -> f64 {
-    if drive.kind == Kind::Preconditioning { 0.0 } else { 2.0 * MARGIN }
+/// Time of these open drives with the rests in their records, and of what else the steps do, s.
+pub(super) fn seconds(steps: &[Step], drives: &[&Drive]) -> f64 {
+    let beside = |step: &Step| match step {
+        // Arming, noise, ramp-down.
+        Step::Wiring => 20.0,
+        Step::Response => response::seconds(),
+        // With |S|, and trajectories of some seconds.
+        Step::Acceptance => 100.0,
+        Step::Identify | Step::Spec => 0.0,
+        _ if drives.iter().any(|drive| step_of(drive) == *step) => 10.0,
+        _ => 0.0,
+    };
+    let margins = |drive: &Drive| if drive.kind == Kind::Preconditioning { 0.0 } else { 2.0 * MARGIN };
+    let of_drives = drives.iter().fold(0.0, |sum, drive| sum + drive.duration() + margins(drive));
+    steps.iter().fold(of_drives, |sum, step| sum + beside(step))
 }
 
-/// Whether a drive belongs to the step of the cross-talk; otherwise to that of the curves.
-pub(super) fn is_cross_talk(drive: &Drive) -> bool {
-    drive.kind == Kind::CrossTalk
+/// The step that a drive belongs to.
+pub(super) fn step_of(drive: &Drive) -> Step {
+    if drive.kind == Kind::CrossTalk { Step::CrossTalk } else { Step::Curves }
 }
 
 /// Drives with records of the hysteresis of a leg: the main curves first, and an arbitrary one last.
 pub(super) fn records(plan: &Plan, leg: usize) -> impl Iterator<Item = &Drive> {
     let shows = |drive: &Drive| matches!(drive.kind, Kind::Curves { .. } | Kind::Arbitrary { .. });
     plan.drives.iter().filter(move |drive| drive.legs.contains(&leg) && shows(drive))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_run_that_goes_on_has_the_time_of_what_is_left() {
+        let bench = Bench {
+            tick_rate: 1e4,
+            voltage: [0.0, 100.0],
+            rest: 0.0,
+            slew_rate: 1e5,
+            stroke: [60e-6; 6],
+            jacobian: core::array::from_fn(|leg| core::array::from_fn(|axis| f64::from(u8::from(leg == axis)))),
+            workspace: [[-1.0, 1.0]; 6],
+            readings: Vec::new(),
+            mains: 50.0,
+            slowest_mode: 361.0,
+        };
+        let plan = assembled::plan(&bench, 8, false).unwrap();
+        let steps = [Step::CrossTalk, Step::Curves];
+        assert_eq!(open(&plan, &steps, |_| false).len(), plan.drives.len());
+        let missing = ["leg1-curves-625", "leg3-arbitrary"];
+        let left = open(&plan, &steps, |drive| !missing.contains(&drive.name.as_str()));
+        let names: Vec<&str> = left.iter().map(|drive| drive.name.as_str()).collect();
+        assert_eq!(names, ["leg1-preconditioning", missing[0], missing[1]]);
+        let expected: f64 = left.iter().map(|drive| drive.duration()).sum::<f64>() + 2.0 * 2.0 * MARGIN + 10.0;
+        assert!((seconds(&steps, &left) - expected).abs() < 1e-9);
+        assert_eq!(seconds(&[Step::Curves, Step::Spec], &[]), 0.0);
+    }
 }

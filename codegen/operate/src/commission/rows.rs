@@ -1,5 +1,6 @@
 //! Files of `watch` as columns, and figures of a platform at rest or on its path.
 
+use std::ops::Range;
 use std::path::Path;
 
 use specgen_identify::mean;
@@ -83,18 +84,57 @@ impl Rows {
         self.six("leg[*]_m")
     }
 
-    /// Set-point less pose of each axis in the last tick of each row, in this span of time (s), m and rad.
-    pub fn errors(&self, [from, to]: [f64; 2]) -> Result<[Vec<f64>; 6], Failure> {
+    /// Those of a simulation, by their names.
+    pub fn new(shown: &str, names: &[&str], columns: Vec<Vec<f64>>) -> Self {
+        Self { shown: shown.to_owned(), names: names.iter().map(|name| (*name).to_owned()).collect(), columns }
+    }
+
+    /// Duration of a tick, s.
+    pub fn period(&self) -> Result<f64, Failure> {
+        let (time, ticks) = (self.column("time_s")?, self.column("ticks")?);
+        let row = time.get(1).map_or(0.0, |second| second - time[0]);
+        Ok(row / ticks[0])
+    }
+
+    /// Rows in a span of time, s.
+    pub fn span(&self, [from, to]: [f64; 2]) -> Result<Range<usize>, Failure> {
         let time = self.time()?;
-        let span = time.partition_point(|t| *t < from)..time.partition_point(|t| *t <= to);
-        let mut errors: [Vec<f64>; 6] = Default::default();
-        for (axis, errors) in errors.iter_mut().enumerate() {
+        Ok(time.partition_point(|t| *t < from)..time.partition_point(|t| *t <= to))
+    }
+
+    /// Columns of the six axes, such as `pose` and `target`, or `error` with `_mean`.
+    pub fn axes(&self, name: &str, which: &str) -> Result<[&[f64]; 6], Failure> {
+        let mut all = [&[] as &[f64]; 6];
+        for (axis, one) in all.iter_mut().enumerate() {
             let unit = if axis < AXES.len() / 2 { "m" } else { "rad" };
-            let [pose, target] = ["pose", "target"].map(|of| self.column(&format!("{of}[{axis}]_{unit}")));
-            let both = target?[span.clone()].iter().zip(&pose?[span.clone()]);
-            *errors = both.map(|(target, pose)| target - pose).collect();
+            *one = self.column(&format!("{name}[{axis}]{which}_{unit}"))?;
         }
-        Ok(errors)
+        Ok(all)
+    }
+
+    /// Error of each axis in the last tick of each row, in this span of time (s), m and rad. A tick reads the pose at its beginning
+    /// and gives the set-point for its end: the motion of the set-point over the tick is no error.
+    pub fn errors(&self, span: [f64; 2]) -> Result<[Vec<f64>; 6], Failure> {
+        let (time, period, span) = (self.time()?, self.period()?, self.span(span)?);
+        let [pose, target] = [self.axes("pose", "")?, self.axes("target", "")?];
+        let last = time.len() - 1;
+        let error = |axis: usize, row: usize| {
+            let (before, after) = (row.saturating_sub(1), if row < last { row + 1 } else { last });
+            let rate = (target[axis][after] - target[axis][before]) / (time[after] - time[before]);
+            let moved = if after > before { period * rate } else { 0.0 };
+            target[axis][row] - moved - pose[axis][row]
+        };
+        Ok(std::array::from_fn(|axis| span.clone().map(|row| error(axis, row)).collect()))
+    }
+
+    /// Rms of each axis within eighths of the record, each without its mean and drift: creep after a motion is slower.
+    pub fn jitter(&self) -> Result<[f64; 6], Failure> {
+        let (time, errors) = (self.time()?, self.errors([0.0, f64::INFINITY])?);
+        let part = time.len().div_ceil(8);
+        let parts = |error: &Vec<f64>| -> Vec<f64> {
+            time.chunks(part).zip(error.chunks(part)).flat_map(|(time, error)| without_line(time, error)).collect()
+        };
+        Ok(errors.each_ref().map(|error| rms(&parts(error))))
     }
 
     /// Noise at rest, with the amplitude at `mains`, Hz. `readings`: of each gauge (rows) per displacement of a leg.
@@ -168,19 +208,35 @@ mod tests {
     use super::*;
 
     #[test]
+    fn the_motion_over_a_tick_is_no_error() {
+        // 1 mm/s for rows of ten ticks of 0.1 ms; the pose follows with 5 nm.
+        let set_point = |row: usize| 1e-6 * row as f64;
+        let column = |of: fn(f64) -> f64| (0..20).map(|row| of(set_point(row))).collect::<Vec<f64>>();
+        let titles =
+            |of: &str| (0..6).map(|k| format!("{of}[{k}]_{}", if k < 3 { "m" } else { "rad" })).collect::<Vec<_>>();
+        let names = [vec!["time_s".to_owned(), "ticks".to_owned()], titles("pose"), titles("target")].concat();
+        let mut columns = vec![(0..20).map(|row| 1e-3 * f64::from(row)).collect(), vec![10.0; 20]];
+        columns.extend(vec![column(|target| target - 1e-7 - 5e-9); 6]);
+        columns.extend(vec![column(|target| target); 6]);
+        let rows = Rows::new("a ramp", &names.iter().map(String::as_str).collect::<Vec<_>>(), columns);
+        let errors = rows.errors([0.0, 1.0]).unwrap();
+        assert!(errors[2].len() == 20 && errors[2].iter().all(|error| (error - 5e-9).abs() < 1e-15), "{errors:?}");
+    }
+
+    #[test]
     fn noise_and_hum_are_found_beside_a_drift() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("rest.csv");
         let title =
             |of: &str| (0..6).map(|k| format!(",{of}[{k}]_{}", if k < 3 { "m" } else { "rad" })).collect::<String>();
         let legs = (0..6).map(|k| format!(",leg[{k}]_m")).collect::<String>();
-        let mut text = format!("time_s{}{}{legs}\n", title("pose"), title("target"));
+        let mut text = format!("time_s,ticks{}{}{legs}\n", title("pose"), title("target"));
         for row in 0..1000 {
             let time = 7.0 + f64::from(row) * 4e-3;
             let noise = if row % 2 == 0 { 2e-9 } else { -2e-9 };
             let hum = 5e-9 * libm::sin(core::f64::consts::TAU * 50.0 * time + 0.3);
             let pose = 1e-6 + 3e-9 * time + noise + hum;
-            text += &format!("{time}{}{}{}\n", format!(",{pose:e}").repeat(6), ",1e-6".repeat(6), ",2e-7".repeat(6));
+            text += &format!("{time},40{}{}{}\n", format!(",{pose:e}").repeat(6), ",1e-6".repeat(6), ",2e-7".repeat(6));
         }
         std::fs::write(&path, &text).unwrap();
         let rest = Rows::read(&path).unwrap().rest(50.0, &[[0.5; 6]; 6]).unwrap();

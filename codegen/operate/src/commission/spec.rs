@@ -3,12 +3,18 @@
 use std::path::{Component, Path};
 
 use specgen_compiler::compile::{self, Compilation};
+use specgen_identify::Parameter;
+use specgen_language::model::{StructuralKind, StructuralMode};
 use specgen_language::outcome::Failure;
 use specgen_language::spec::SpecSource;
-use toml_edit::{Array, DocumentMut, Item, Table, Value};
+use specgen_studies::open_response::OtherMode;
+use toml_edit::{Array, ArrayOfTables, DocumentMut, Item, Table, Value};
 
-use super::state::{State, Step};
+use super::state::{Response, State, Step};
 
+/// Least size of a figure over its standard error that is written, and the largest damping ratio.
+const SURE: f64 = 3.0;
+const MOST_DAMPING: f64 = 0.3;
 /// Keys of creep and rate that a leg model replaces.
 const RATE: [&str; 4] = ["rate", "creep_times", "creep_weights", "rate_tables"];
 
@@ -24,14 +30,21 @@ pub(super) fn edited(
     dir: &Path,
 ) -> Result<(String, Compilation), Failure> {
     let sizes = (compiled.model.actuator.stacks, compiled.model.hysteresis.grid);
-    let text = with(&compiled.source.text, state, folder, sizes).map_err(Failure::Gate)?;
+    let known = &compiled.model.structural_modes;
+    let text = with(&compiled.source.text, state, folder, (sizes, (known, compiled.model.timing.period)))
+        .map_err(Failure::Gate)?;
     let source =
         SpecSource { text: text.clone(), dir: dir.to_owned(), display_name: "the commissioned spec".to_owned() };
     Ok((text, compile::compile_source(source)?))
 }
 
-/// The text of a spec with what was found; `grid`: cells of the tables.
-fn with(text: &str, state: &State, folder: &str, (stacks, grid): (u32, usize)) -> Result<String, String> {
+/// The text of a spec with what was found; `grid`: cells of the tables, `known`: its structural modes.
+fn with(
+    text: &str,
+    state: &State,
+    folder: &str,
+    ((stacks, grid), known): ((u32, usize), (&[StructuralMode], f64)),
+) -> Result<String, String> {
     let mut document: DocumentMut = text.parse().map_err(|error| format!("{error}"))?;
     let mut measured = Vec::new();
     let date = |step| state.steps.get(&step).map_or("", |passed| passed.date.as_str());
@@ -65,12 +78,78 @@ fn with(text: &str, state: &State, folder: &str, (stacks, grid): (u32, usize)) -
         set(actuator, "cross_talk", Value::Array(matrix), &note);
         measured.push("actuator.cross_talk");
     }
+    if let Some(response) = &state.response {
+        measured.extend(dynamics(&mut document, response, known)?);
+    }
     if let Some(assumed) = document.get_mut("assumed").and_then(Item::as_array_mut) {
         assumed.retain(|entry| entry.as_str().is_none_or(|key| !measured.contains(&key)));
     }
     let written = document.to_string();
     // The editor ends every line with `\n`.
     Ok(if text.contains("\r\n") { written.replace("\r\n", "\n").replace('\n', "\r\n") } else { written })
+}
+
+/// Lag, damping and structural modes, as found in the response at rest; returns the keys that are written. A spec has no dead time: one
+/// that is too small to be certain counts as lag.
+fn dynamics(
+    document: &mut DocumentMut,
+    response: &Response,
+    (known, period): (&[StructuralMode], f64),
+) -> Result<Vec<&'static str>, String> {
+    let Response { found, date, .. } = response;
+    let is_sure = |of: &Parameter| of.value > SURE * of.error;
+    let mut measured = Vec::new();
+    let (lag, what) = if response.has_dead_time(period) { (found.lag, "") } else { (found.delay, "with dead time, ") };
+    if is_sure(&lag) {
+        let amplifier = document.entry("amplifier").or_insert_with(toml_edit::table);
+        let amplifier = amplifier.as_table_mut().ok_or("`amplifier` is not written as a section [amplifier]")?;
+        let [value, error] = [lag.value, lag.error].map(|time| time * 1e3);
+        let note = format!("± {error:.4}, {what}mean of the legs, response-leg0.rec and others, measured {date}");
+        set(amplifier, "lag", format!("{value:.4} ms").into(), &note);
+        measured.push("amplifier.lag");
+    }
+    let lowest = found.modes.first().filter(|mode| is_sure(&mode.zeta) && mode.zeta.value < MOST_DAMPING);
+    if let Some(lowest) = lowest {
+        let note =
+            format!("± {:.5}, of the mode at {:.1} Hz, measured {date}", lowest.zeta.error, lowest.frequency.value);
+        set(section(document, "control")?, "modal_damping", digits(lowest.zeta.value, 1e5).into(), &note);
+        measured.push("control.modal_damping");
+    }
+    let mut listed: Vec<_> = known.iter().map(|mode| (mode.kind, mode.place, mode.frequency)).collect();
+    for mode in found.others.iter().filter(|mode| !mode.known) {
+        let OtherMode { frequency, zeta, place, participation, .. } = mode;
+        let here = (kind_and_number(place), libm::round(10.0 * frequency.value) / 10.0);
+        let here = (here.0.0, here.0.1, here.1);
+        // A gauge that moves against its leg would become one of the frame, which acts on all gauges: the page names it.
+        if here.0 == StructuralKind::Frame || listed.iter().any(|other| StructuralMode::coincide(here, *other)) {
+            continue;
+        }
+        listed.push(here);
+        let all = document.entry("mode").or_insert_with(|| Item::ArrayOfTables(ArrayOfTables::new()));
+        let all = all.as_array_of_tables_mut().ok_or("`mode` is not written as [[mode]]")?;
+        let mut table = Table::new();
+        let note = format!("± {:.1}, response-leg0.rec and others, measured {date}", frequency.error);
+        set(&mut table, "frequency", format!("{:.1} Hz", here.2).into(), &note);
+        set(&mut table, "damping_ratio", digits(zeta.value, 1e4).into(), &format!("± {:.4}", zeta.error));
+        table.insert("at", toml_edit::value(place.as_str()));
+        if here.0 != StructuralKind::Leg {
+            let note = format!("± {:.3}", participation.error);
+            set(&mut table, "participation", digits(participation.value, 1e3).into(), &note);
+        }
+        all.push(table);
+    }
+    Ok(measured)
+}
+
+/// Kind of a place such as `gauge 2`, and the number of the leg or gauge, from 0.
+fn kind_and_number(place: &str) -> (StructuralKind, Option<usize>) {
+    let mut words = place.split(' ');
+    let kind = match words.next() {
+        Some("leg") => StructuralKind::Leg,
+        Some("gauge") => StructuralKind::Gauge,
+        _ => StructuralKind::Frame,
+    };
+    (kind, words.next().and_then(|number| number.parse::<usize>().ok()?.checked_sub(1)))
 }
 
 /// Each word once, in order.
@@ -86,7 +165,11 @@ fn listed(words: &[&str]) -> String {
 
 /// To seven digits behind the point: 0.1 nm of a stroke of a millimetre.
 fn rounded(entry: f64) -> f64 {
-    libm::round(entry * 1e7) / 1e7
+    digits(entry, 1e7)
+}
+
+fn digits(value: f64, unit: f64) -> f64 {
+    libm::round(value * unit) / unit
 }
 
 fn section<'a>(document: &'a mut DocumentMut, name: &str) -> Result<&'a mut Table, String> {
@@ -134,6 +217,8 @@ pub(super) fn from_spec(spec: &Path, folder: &Path) -> Result<String, Failure> {
 
 #[cfg(test)]
 mod tests {
+    use specgen_studies::open_response::{FoundMode, OpenResponse};
+
     use super::super::state::{Coupling, Leg};
     use super::*;
 
@@ -160,7 +245,7 @@ mod tests {
             stack_gain = \"0.1 um/V\"   # guess\n\n[hysteresis]\ngrid = 32 # N\nrecords = [\"a.csv\"]\nrate = \"creep\"\n\
             creep_times = [\"1 s\"]\ncreep_weights = [0.1]\n\n[timing]\nperiod = \"100 us\"\n";
         for text in [text.to_owned(), text.replace('\n', "\r\n")] {
-            let new = with(&text, &state(), "commission/", (5, 32)).unwrap();
+            let new = with(&text, &state(), "commission/", ((5, 32), (&[], 1e-4))).unwrap();
             let lines: Vec<&str> = new.lines().collect();
             assert_eq!(new.contains("\r\n"), text.contains("\r\n"));
             let line = |start: &str| *lines.iter().find(|line| line.starts_with(start)).unwrap_or(&"");
@@ -180,13 +265,52 @@ mod tests {
             }
             assert!(!new.contains("creep") && !new.contains("rate"), "{new}");
             // Again, as after a repeated step.
-            assert_eq!(with(&new, &state(), "commission/", (5, 32)).unwrap(), new);
+            assert_eq!(with(&new, &state(), "commission/", ((5, 32), (&[], 1e-4))).unwrap(), new);
         }
         assert!(
-            with("actuator = 1\n", &state(), "", (5, 32))
+            with("actuator = 1\n", &state(), "", ((5, 32), (&[], 1e-4)))
                 .unwrap_err()
                 .contains("not written as a section [hysteresis]")
         );
+    }
+
+    #[test]
+    fn lag_damping_and_new_modes_are_written_once() {
+        let of = |value: f64, error: f64| Parameter { value, error };
+        let mode = |frequency: f64, place: &str, participation: f64| OtherMode {
+            frequency: of(frequency, 0.2),
+            zeta: of(0.012_34, 1e-4),
+            place: place.to_owned(),
+            participation: of(participation, 0.01),
+            known: false,
+        };
+        let lowest = FoundMode { frequency: of(355.0, 0.1), zeta: of(0.021_234_5, 2e-5), spec: [361.0, 0.02] };
+        let found = OpenResponse {
+            modes: vec![lowest],
+            others: vec![mode(1107.18, "gauge 4", 0.2), mode(1300.0, "leg 2", 1.0)],
+            delay: of(352.4e-6, 1.4e-6),
+            ..OpenResponse::default()
+        };
+        let response = Response { found, strokes: [0.0; 6], date: "2026-11-29".to_owned(), agreement: Vec::new() };
+        let state = State { response: Some(response), ..State::default() };
+        let text = "assumed = [\"amplifier.lag\", \"control.modal_damping\", \"gauge\"]\n\n[control]\nmodal_damping = 0.02 # guess\n";
+        let new = with(text, &state, "", ((5, 32), (&[], 1e-4))).unwrap();
+        for part in [
+            "assumed = [ \"gauge\"]\n",
+            "modal_damping = 0.02123  # ± 0.00002, of the mode at 355.0 Hz, measured 2026-11-29",
+            "[amplifier]\nlag = \"0.3524 ms\"  # ± 0.0014, with dead time",
+            "[[mode]]\nfrequency = \"1107.2 Hz\"  # ± 0.2, response-leg0.rec and others, measured 2026-11-29\ndamping_ratio = 0.0123",
+            "at = \"gauge 4\"\nparticipation = 0.2  # ± 0.010\n",
+            "at = \"leg 2\"\n",
+        ] {
+            assert!(new.contains(part), "{part}: {new}");
+        }
+        assert_eq!(new.matches("participation").count(), 1, "{new}");
+        let own =
+            |kind, place, frequency| StructuralMode { frequency, damping_ratio: 0.01, kind, place, participation: 0.2 };
+        let known = [own(StructuralKind::Gauge, Some(3), 1110.0), own(StructuralKind::Leg, Some(1), 1200.0)];
+        let again = with(text, &state, "", ((5, 32), (&known, 1e-4))).unwrap();
+        assert!(!again.contains("gauge 4") && again.contains("at = \"leg 2\""), "{again}");
     }
 
     #[test]

@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 use specgen_language::files;
 use specgen_language::outcome::Failure;
 use specgen_language::output::{edit_file, unread_file};
+use specgen_studies::open_response::OpenResponse;
 
 /// Name of the file.
 pub(super) const FILE: &str = "commission.json";
@@ -19,6 +20,8 @@ pub(super) const FILE: &str = "commission.json";
 pub enum Step {
     /// Noise of the gauges, amplifiers off; then the wiring check of the controller, and the noise with the amplifiers on.
     Wiring,
+    /// Lag, modes and damping at rest.
+    Response,
     /// E of the assembled legs.
     CrossTalk,
     /// Reversal curves of each leg, and an arbitrary record.
@@ -33,10 +36,10 @@ pub enum Step {
 
 impl Step {
     /// All, in their order.
-    pub const ALL: [Self; 6] =
-        [Self::Wiring, Self::CrossTalk, Self::Curves, Self::Identify, Self::Spec, Self::Acceptance];
+    pub const ALL: [Self; 7] =
+        [Self::Wiring, Self::Response, Self::CrossTalk, Self::Curves, Self::Identify, Self::Spec, Self::Acceptance];
     /// Their names, in the same order.
-    pub const NAMES: [&str; 6] = ["wiring", "cross-talk", "curves", "identify", "spec", "acceptance"];
+    pub const NAMES: [&str; 7] = ["wiring", "response", "cross-talk", "curves", "identify", "spec", "acceptance"];
 
     /// Its name.
     #[must_use]
@@ -107,9 +110,24 @@ pub(super) struct Peak {
     pub amplitude: f64,
 }
 
+/// The response at rest.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(super) struct Response {
+    /// Lag, modes and damping.
+    #[serde(flatten)]
+    pub found: OpenResponse,
+    /// Displacement of each leg per volt in a stroke, m/V.
+    pub strokes: [f64; 6],
+    /// Day of the records, UTC.
+    pub date: String,
+    /// What disagrees with the spec.
+    pub agreement: Vec<String>,
+}
+
 /// E of the legs.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(super) struct Coupling {
+pub struct Coupling {
+    /// By row and column; its diagonal is zero.
     pub matrix: [[f64; 6]; 6],
     /// Largest standard error of an entry.
     pub error: f64,
@@ -138,12 +156,38 @@ pub(super) struct Figure {
     /// 0 to 5 for an axis; 0 also for the translation as a whole.
     pub axis: usize,
     pub value: f64,
-    /// Computed from the spec.
+    /// By the simulation of the identified machine.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub computed: Option<f64>,
     /// Limit, and its key.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub limit: Option<(f64, String)>,
+}
+
+/// |S| at a frequency: by the axis along which the set-point moved. None where the error was too small to tell.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(super) struct Sensitivity {
+    pub hertz: f64,
+    /// Number of the mode at this frequency.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mode: Option<usize>,
+    pub measured: [Option<f64>; 6],
+    /// Standard error of the measured value.
+    pub error: [f64; 6],
+    /// Of the spec, for the same direction.
+    pub computed: [f64; 6],
+}
+
+/// A trajectory that was learned: error by the gauges in its first pass and in that of the correction that is kept, m rms.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(super) struct Learned {
+    pub trajectory: String,
+    pub before: f64,
+    pub after: f64,
+    /// Passes until then.
+    pub passes: u64,
+    /// File of the correction.
+    pub correction: String,
 }
 
 /// Everything that is known.
@@ -158,6 +202,9 @@ pub(super) struct State {
     /// Digest of the spec that was written.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub written: Option<String>,
+    /// Tables that the written spec names are replaced, or were and the spec was not: it has another digest than the one above.
+    #[serde(default, skip_serializing_if = "core::ops::Not::not")]
+    pub replacing: bool,
     /// Cells of the reversal curves, and Hz of the mains.
     pub grid: usize,
     pub mains: f64,
@@ -172,10 +219,19 @@ pub(super) struct State {
     pub rest: Vec<Rest>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub cross_talk: Option<Coupling>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub response: Option<Response>,
     #[serde(default)]
     pub legs: Vec<Leg>,
     #[serde(default)]
     pub acceptance: Vec<Figure>,
+    /// Error of a straight line of the first spec on the arbitrary record of each leg, m rms.
+    #[serde(default)]
+    pub straight: Vec<Option<f64>>,
+    #[serde(default)]
+    pub sensitivity: Vec<Sensitivity>,
+    #[serde(default)]
+    pub learned: Vec<Learned>,
 }
 
 impl State {
@@ -206,9 +262,37 @@ impl State {
         edit_file(&folder.join(FILE), text.as_bytes())
     }
 
+    /// This one with what the records of a folder show that lost its file: a step was done on the day of its last record.
+    pub fn of_records(mut self, folder: &Path) -> Self {
+        let last = |step| match step {
+            Step::Wiring => "rest-on.csv",
+            Step::Response => "response-leg5.rec",
+            Step::CrossTalk => "leg5-cross-talk.csv",
+            Step::Curves => "leg5-arbitrary.csv",
+            Step::Identify => "leg5.csv",
+            Step::Spec => "platform.toml",
+            Step::Acceptance => "accept-hold.csv",
+        };
+        for step in Step::ALL {
+            let written = std::fs::metadata(folder.join(last(step))).and_then(|found| found.modified());
+            if let Ok(time) = written {
+                self.steps.insert(step, Passed { date: day_of(time), skipped: None });
+            }
+        }
+        if self.is_over(Step::Acceptance) {
+            self.written = Some(self.spec.clone());
+        }
+        self
+    }
+
     /// Whether a step is over.
     pub fn is_over(&self, step: Step) -> bool {
         self.steps.contains_key(&step)
+    }
+
+    /// Whether a step was skipped.
+    pub fn is_skipped(&self, step: Step) -> bool {
+        self.steps.get(&step).is_some_and(|passed| passed.skipped.is_some())
     }
 
     /// Notes that a step is over, or why it was skipped.
@@ -219,12 +303,16 @@ impl State {
     /// Forgets a step, and the later ones that need it.
     pub fn forget(&mut self, step: Step) {
         self.steps.remove(&step);
+        // The response is needed where the curves are evaluated.
+        let first = if step == Step::Response { Step::Identify } else { step };
         if step != Step::Wiring && step != Step::Acceptance {
-            self.steps.retain(|later, passed| *later < step || passed.skipped.is_some());
+            self.steps.retain(|later, passed| *later < first || passed.skipped.is_some());
         }
         // Figures of another controller.
         if !self.is_over(Step::Acceptance) {
             self.acceptance.clear();
+            self.sensitivity.clear();
+            self.learned.clear();
         }
     }
 }
@@ -235,9 +323,13 @@ pub(super) fn record(folder: &Path, name: &str) -> PathBuf {
 }
 
 /// The day of now, UTC.
-fn today() -> String {
-    let seconds = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |time| time.as_secs());
-    date(seconds / 86_400)
+pub(super) fn today() -> String {
+    day_of(SystemTime::now())
+}
+
+/// The day of a time, UTC.
+fn day_of(time: SystemTime) -> String {
+    date(time.duration_since(UNIX_EPOCH).map_or(0, |time| time.as_secs()) / 86_400)
 }
 
 /// The day so many days after 1 January 1970, in the form 2026-11-29. Years count from 1 March, so that a leap day is the last of
@@ -298,7 +390,7 @@ mod tests {
     fn steps_are_named_and_skipped_with_a_reason() {
         assert_eq!(Step::ALL.map(Step::name), Step::NAMES);
         assert_eq!(Step::parse("cross-talk"), Ok(Step::CrossTalk));
-        assert!(Step::parse("rest").unwrap_err().contains("expected wiring, cross-talk"));
+        assert!(Step::parse("rest").unwrap_err().contains("expected wiring, response, cross-talk"));
         assert_eq!(Step::parse_skip("curves=done before"), Ok((Step::Curves, "done before".to_owned())));
         assert!(Step::parse_skip("curves").unwrap_err().contains("expected STEP=REASON"));
         assert!(Step::parse_skip("curves= ").unwrap_err().contains("expected STEP=REASON"));

@@ -74,6 +74,10 @@ pub enum PageRequest {
         id: u32,
     },
     EndCheck,
+    /// Begins or continues the commissioning.
+    Commission {
+        id: u32,
+    },
 }
 
 #[derive(Debug, Deserialize, Clone, Copy, PartialEq, Eq)]
@@ -380,7 +384,8 @@ impl PageRequest {
             | Self::Gain { id, .. }
             | Self::Restore { id }
             | Self::Download { id }
-            | Self::Check { id } => *id,
+            | Self::Check { id }
+            | Self::Commission { id } => *id,
             _ => 0,
         }
     }

@@ -7,10 +7,11 @@ use crate::Command;
 use serde_json::{Value, json};
 use specgen_link::RecorderAction;
 use specgen_link::client::Port;
-use specgen_runtime::supervisor::Request;
+use specgen_runtime::supervisor::{Phase, Request};
 use tungstenite::Message;
 
 use super::clients::{EdgeRequest, PageRequest};
+use super::commissioning::Runner;
 use super::request::{execute, send_edge};
 use super::{Panel, wiring};
 use crate::commands::{Operator, SessionError, recoverable};
@@ -66,6 +67,9 @@ pub(super) fn carry_out<P: Port + 'static>(
     request: &PageRequest,
     quiet: &Ui,
 ) -> Result<Value, SessionError> {
+    if panel.borrow().is_commissioning() {
+        return Err(SessionError::Refused("the machine is being commissioned: stop that first".to_owned()));
+    }
     match request {
         PageRequest::Command { line, .. } => {
             let command = Command::parse(line).map_err(SessionError::Refused)?;
@@ -129,6 +133,18 @@ pub(super) fn carry_out<P: Port + 'static>(
             bytes.extend(&record);
             panel.borrow().clients.tell(page, Message::binary(bytes));
             Ok(json!(record.len()))
+        }
+        PageRequest::Commission { .. } => {
+            if u64::from(operator.phase()) != Phase::Disarmed.word() {
+                return Err(SessionError::Refused("it begins with a disarmed machine: ramp down first".to_owned()));
+            }
+            // The command is the host in control; this one only watches, and stops.
+            operator.in_control = false;
+            let mut panel = panel.borrow_mut();
+            let runner = panel.commissioning.as_mut().ok_or("no folder for it: start the panel with --commission DIR");
+            runner.map_err(str::to_owned).and_then(Runner::begin).map_err(SessionError::Refused)?;
+            panel.clients.note("note", &format!("Page {page} began the commissioning."), "", None);
+            Ok(Value::Null)
         }
         PageRequest::Check { .. } => {
             panel.borrow_mut().clients.note("note", &format!("Page {page} started the wiring check."), "", None);

@@ -2,6 +2,7 @@
 
 use std::io::{self, Read, Write};
 use std::net::{IpAddr, TcpStream};
+use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 use tungstenite::handshake::derive_accept_key;
@@ -19,12 +20,16 @@ const TOKEN: usize = 16;
 pub struct Guard {
     token: String,
     port: u16,
+    /// File of the page about a commissioning.
+    pub result: Option<PathBuf>,
 }
 
 /// The destination of a request.
 #[derive(Debug, PartialEq, Eq)]
 enum Route {
     Page,
+    /// The page about the commissioning.
+    Result,
     /// A WebSocket, with the key of its handshake.
     Socket(String),
     /// Status and reason.
@@ -39,7 +44,8 @@ impl Guard {
     pub fn new(port: u16) -> io::Result<Self> {
         let mut bytes = [0; TOKEN];
         std::fs::File::open("/dev/urandom")?.read_exact(&mut bytes)?;
-        Ok(Self { token: bytes.iter().map(|byte| format!("{byte:02x}")).collect(), port })
+        let token = bytes.iter().map(|byte| format!("{byte:02x}")).collect();
+        Ok(Self { token, port, result: None })
     }
 
     /// The token, hexadecimal.
@@ -58,8 +64,14 @@ impl Guard {
         read();
         let head = head?;
         let route = self.route(&head);
+        let result = self.result.as_ref().filter(|_| route == Route::Result);
+        let result = result.and_then(|path| std::fs::read_to_string(path).ok());
         let (status, kind, body) = match &route {
             Route::Page => ("200 OK", "text/html", page),
+            Route::Result => match &result {
+                Some(text) => ("200 OK", "text/html", text.as_str()),
+                None => ("404 Not Found", "text/plain", "there is no result yet\n"),
+            },
             Route::Socket(key) => {
                 let accept = derive_accept_key(key.as_bytes());
                 let answer = format!(
@@ -106,8 +118,8 @@ impl Guard {
         }
         let (path, query) =
             request.path.and_then(|path| path.split_once('?')).unwrap_or((request.path.unwrap_or(""), ""));
-        if !matches!(path, "/" | "/socket") {
-            return Route::Refused("404 Not Found", "the panel has only the page /\n");
+        if !matches!(path, "/" | "/commission" | "/socket") {
+            return Route::Refused("404 Not Found", "the panel has only the pages / and /commission\n");
         }
         let token = query.split('&').find_map(|part| part.strip_prefix("token=")).unwrap_or("");
         if !is_same(token, &self.token) {
@@ -116,8 +128,10 @@ impl Guard {
                 "the token is missing or wrong: open the address that `specgen panel` printed\n",
             );
         }
-        if path == "/" {
-            return Route::Page;
+        match path {
+            "/" => return Route::Page,
+            "/commission" => return Route::Result,
+            _ => {}
         }
         let of_ours = |origin: &str| origin.strip_prefix("http://").is_some_and(|origin| Some(origin) == field("host"));
         if !field("origin").is_some_and(of_ours) {
@@ -167,7 +181,7 @@ mod tests {
 
     #[test]
     fn only_the_panels_own_page_gets_in() {
-        let guard = Guard { token: "00ff".to_owned(), port: 8000 };
+        let guard = Guard { token: "00ff".to_owned(), port: 8000, result: None };
         let get = |path: &str, fields: &str| guard.route(format!("GET {path} HTTP/1.1\r\n{fields}\r\n").as_bytes());
         let refused = |route: Route, code: &str| matches!(route, Route::Refused(status, _) if status.starts_with(code));
         for host in ["127.0.0.1:8000", "localhost:8000", "[::1]:8000", "192.168.1.7:8000"] {
@@ -179,6 +193,8 @@ mod tests {
         for path in ["/", "/?token=", "/?token=00fe", "/?token=00ff0", "/?tokens=00ff"] {
             assert!(refused(get(path, "Host: localhost:8000\r\n"), "403"), "{path}");
         }
+        assert_eq!(get("/commission?token=00ff", "Host: localhost:8000\r\n"), Route::Result);
+        assert!(refused(get("/commission", "Host: localhost:8000\r\n"), "403"));
         assert!(refused(get("/x?token=00ff", "Host: localhost:8000\r\n"), "404"));
         assert!(refused(guard.route(b"POST / HTTP/1.1\r\n\r\n"), "405"));
         assert!(refused(guard.route(b"\x00\x01\r\n\r\n"), "400"));

@@ -239,7 +239,7 @@
   // Nothing but a stop can be asked of a machine without a link.
   function unlinked() {
     moves.forEach(one => { one.disabled = true; });
-    ["arm", "run", "acknowledge", "bias", "play", "record", "download", "apply", "restore"].forEach(id => allow(by(id), "no link"));
+    ["arm", "run", "acknowledge", "bias", "play", "record", "download", "apply", "restore", "commission-begin"].forEach(id => allow(by(id), "no link"));
   }
 
   function controls() {
@@ -303,6 +303,45 @@
     by("gain-note").textContent = "all axes; computed margin " + (facts.gain_margin ? "×" + number(Number(facts.gain_margin.toPrecision(3))) : "above the searched range");
     allow(by("apply"), control || (facts.gain_margin && gain.factor >= facts.gain_margin ? "unstable: above the computed margin" : state.busy ? "a command is running" : ""));
     checked(state.check, phase, control);
+    commissioned(state.commission, phase, control);
+  }
+
+  // The steps with their state, what the command says, findings, and the result.
+  function commissioned(now, phase, control) {
+    by("commission").hidden = !now;
+    if (!now) return;
+    const plan = now.outlook, steps = plan.steps || [], open = steps.filter(step => step.next);
+    const left = plan.seconds ? "about " + (plan.seconds / 60).toFixed(0) + "\u2009min of machine time" : "";
+    by("commission-note").textContent = now.runs ? "running" + (left ? " · " + left : "") : left;
+    by("commission-begin").querySelector("b").textContent = steps.some(step => step.date) ? "Continue" : "Begin";
+    const why = plan.refused || (open.length ? "" : plan.other ? "build and start the new controller" : "all steps are done");
+    allow(by("commission-begin"), now.runs ? "running" : phase !== "disarmed" ? "ramp down first" : why ? why : control, "press 1\u2009s");
+    allow(by("commission-end"), now.runs ? "" : "not running");
+    by("commission-said").textContent = now.runs ? now.said : now.ended ? "Ended: " + now.ended : "";
+    const page = by("commission-page");
+    page.hidden = !plan.page;
+    page.href = "/commission" + location.search;
+    const text = JSON.stringify([plan, now.runs]);
+    if (commissioned.shown === text) return;
+    commissioned.shown = text;
+    const list = by("commission-steps"), found = by("commission-found");
+    list.replaceChildren();
+    found.replaceChildren();
+    let first = true;
+    for (const step of steps) {
+      const does = step.next && now.runs && first, line = html("div", list, "", "row");
+      if (step.next) first = false;
+      line.innerHTML = '<svg class="mark"><use href="#m-' + (step.skipped ? "note" : step.date && !step.next ? "ok" : "none") + '"/></svg>';
+      html("span", line, step.name + (step.skipped ? ": skipped, " + step.skipped : ""));
+      html("span", line, step.date && !step.next ? step.date : does ? "now" : "open");
+    }
+    const findings = [...(plan.findings || []), ...(plan.missed ? [plan.missed] : []), ...(plan.refused ? [plan.refused] : [])];
+    if (plan.other) findings.push("Build the commissioned spec, start its controller, and a panel with that spec: acceptance is left.");
+    for (const finding of findings) {
+      const line = html("div", found, "", "row");
+      line.innerHTML = '<svg class="mark"><use href="#m-warning"/></svg>';
+      html("span", line, finding);
+    }
   }
 
   function checked(check, phase, control) {
@@ -381,6 +420,9 @@
   by("check").addEventListener("click", () => by("panel-check").show());
   slow(by("check-begin"), () => command({ do: "check" }));
   by("check-end").addEventListener("click", () => say({ do: "end-check" }));
+  by("commission").addEventListener("click", () => by("panel-commission").show());
+  slow(by("commission-begin"), () => command({ do: "commission" }));
+  by("commission-end").addEventListener("click", () => urgent("ramp-down"));
   for (const button of document.querySelectorAll("[data-close]")) button.addEventListener("click", () => button.closest("dialog").close());
 
   // ── Themes, sizes, time ──

@@ -13,6 +13,7 @@ use specgen_runtime::{ControlMode, Law};
 
 use super::response::Response;
 use crate::factors::{Factor, Factors};
+use specgen_numerics::Matrix6;
 use specgen_numerics::complex6::{Matrix6c, inverse, larger, left, multiply, norm, spectral_radius};
 
 /// Largest permitted spectral radius of Q (I − T L): the error of a pass relative to that of the pass before.
@@ -201,6 +202,16 @@ impl Learnable {
     /// The initial control mode and its gains.
     pub(crate) fn law(&self) -> (ControlMode, &Tuning) {
         (self.law, &self.tuning)
+    }
+
+    /// S of the law that the spec starts with, at these frequencies (Hz), in pose coordinates.
+    pub fn sensitivity(&self, hertz: &[f64]) -> Vec<Matrix6c> {
+        let closed_loop = &self.closed_loop;
+        let angles: Vec<f64> = hertz.iter().map(|hertz| TAU * hertz * closed_loop.period).collect();
+        let complex = |matrix: &Matrix6| matrix.map(|row| row.map(|value| [value, 0.0]));
+        let [from, to] = [&closed_loop.basis.from_modal, &closed_loop.basis.to_modal].map(complex);
+        let modal = closed_loop.sensitivity(self.law, &self.tuning, &angles);
+        modal.iter().map(|modal| multiply(&multiply(&from, modal), &to)).collect()
     }
 
     /// Natural frequencies of its modes, rad/s.

@@ -21,16 +21,16 @@ use super::convergence::Learnable;
 use super::response::Bin;
 use fit::{Domain, Fit, Problem, RATIO, Resonance};
 
-mod fit;
+pub(crate) mod fit;
 
 /// Largest number of modes.
-const MAX_MODES: usize = 6;
+pub(crate) const MAX_MODES: usize = 6;
 /// Least fall of χ² by a mode, in units of χ² per degree of freedom.
-const MIN_CHI2_DROP: f64 = 60.0;
+pub(crate) const MIN_CHI2_DROP: f64 = 60.0;
 /// Largest standard error of a mode's figures relative to their values.
-const UNCERTAIN: f64 = 1.0 / 3.0;
+pub(crate) const UNCERTAIN: f64 = 1.0 / 3.0;
 /// A mode of less participation disturbs no loop, and may be a trace of hysteresis.
-const LEAST_PART: f64 = 0.03;
+pub(crate) const LEAST_PART: f64 = 0.03;
 /// Steps of a fit.
 const STEPS: usize = 30;
 /// Steps of the fits from which the best is chosen.
@@ -52,7 +52,7 @@ const PARTICIPATIONS: [f64; 2] = [0.5, 0.1];
 const SHORT_OF: f64 = 0.95;
 
 /// What a fit leaves in one direction: frequency, Hz, relative residual, weight.
-type Direction = Vec<(f64, Complex, f64)>;
+pub(crate) type Direction = Vec<(f64, Complex, f64)>;
 
 /// Where a structural mode acts. Legs and gauges are numbered from 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -135,11 +135,17 @@ impl StructuralMode {
         (kind, number, libm::round(10.0 * self.frequency.value) / 10.0)
     }
 
+    /// `at` of a `[[mode]]`.
+    pub(crate) fn at(&self) -> String {
+        let (kind, number, _) = self.written();
+        number.map_or(kind.word().to_owned(), |number| format!("{} {}", kind.word(), number + 1))
+    }
+
     /// A `[[mode]]` of a spec.
     fn lines(&self) -> String {
         let Self { frequency, damping, participation, place } = self;
-        let (kind, number, hertz) = self.written();
-        let at = number.map_or(kind.word().to_owned(), |number| format!("{} {}", kind.word(), number + 1));
+        let (_, number, hertz) = self.written();
+        let at = self.at();
         let seen = match place {
             // A spec has no reaction in one gauge alone. In all gauges it disturbs the loop more.
             Location::Gauge(gauge) if number.is_none() => format!("  # in gauge {}", gauge + 1),
@@ -155,7 +161,7 @@ impl StructuralMode {
         lines
     }
 
-    fn is_certain(&self) -> bool {
+    pub(crate) fn is_certain(&self) -> bool {
         let sure = |figure: &Parameter| figure.error <= UNCERTAIN * figure.value.abs();
         let physical = self.participation.value.abs() <= 1.0 && self.damping.value < 0.99 * RATIO[1];
         sure(&self.frequency) && sure(&self.damping) && sure(&self.participation) && physical
@@ -202,7 +208,7 @@ impl Problem {
             let modes = fit.modes.iter().copied().chain([mode]).collect();
             self.fitted(&fit.platform, modes, FIRST_STEPS, Domain::Open)
         };
-        let sought: Vec<Fit> = self.candidates(&fit).into_iter().map(with).collect();
+        let sought: Vec<Fit> = candidates(self.directions(&fit)).into_iter().map(with).collect();
         let fall = |next: &Fit| fit.cost - next.cost;
         let most = sought.iter().map(fall).max_by(f64::total_cmp)?;
         let shown = |next: &Fit| fall(next) >= NEAR_BEST * most && fall(next) >= MIN_CHI2_DROP * self.misfit(next);
@@ -242,30 +248,6 @@ impl Problem {
         all
     }
 
-    /// The most likely modes: of each direction the one whose shape explains most, the best [`PLACES`].
-    fn candidates(&self, fit: &Fit) -> Vec<Resonance> {
-        let best = self.directions(fit).into_iter().filter_map(|(place, list)| {
-            let shapes = list.iter().flat_map(|(hertz, ..)| RATIOS.map(|ratio| (*hertz, ratio)));
-            let explained = shapes.filter_map(|(hertz, ratio)| {
-                let (share, norm) = shaped(&list, hertz, ratio)?;
-                let part = (share[0] / norm).clamp(-1.0, 1.0);
-                let values = [libm::log(hertz), libm::log(ratio), part];
-                Some((square(share) / norm, Resonance { place, values }))
-            });
-            explained.max_by(|a, b| a.0.total_cmp(&b.0))
-        });
-        let mut best: Vec<_> = best.collect();
-        best.sort_by(|a, b| b.0.total_cmp(&a.0));
-        let mut chosen = Vec::new();
-        for (_, mode) in best.into_iter().take(PLACES) {
-            chosen.push(mode);
-            if mode.place == Location::Legs {
-                chosen.push(Resonance { place: Location::Gauges, ..mode });
-            }
-        }
-        chosen
-    }
-
     /// The band in which a mode at any place would have been found.
     fn band(&self, fit: &Fit, unresolved: Option<f64>) -> Option<[f64; 2]> {
         let misfit = self.misfit(fit);
@@ -290,6 +272,30 @@ impl Problem {
         let high = if edge < high { edge } else { high };
         (high > within[0]).then_some([within[0], high])
     }
+}
+
+/// The most likely modes: of each direction the one whose shape explains most, the best [`PLACES`].
+pub(crate) fn candidates(directions: Vec<(Location, Direction)>) -> Vec<Resonance> {
+    let best = directions.into_iter().filter_map(|(place, list)| {
+        let shapes = list.iter().flat_map(|(hertz, ..)| RATIOS.map(|ratio| (*hertz, ratio)));
+        let explained = shapes.filter_map(|(hertz, ratio)| {
+            let (share, norm) = shaped(&list, hertz, ratio)?;
+            let part = (share[0] / norm).clamp(-1.0, 1.0);
+            let values = [libm::log(hertz), libm::log(ratio), part];
+            Some((square(share) / norm, Resonance { place, values }))
+        });
+        explained.max_by(|a, b| a.0.total_cmp(&b.0))
+    });
+    let mut best: Vec<_> = best.collect();
+    best.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let mut chosen = Vec::new();
+    for (_, mode) in best.into_iter().take(PLACES) {
+        chosen.push(mode);
+        if mode.place == Location::Legs {
+            chosen.push(Resonance { place: Location::Gauges, ..mode });
+        }
+    }
+    chosen
 }
 
 /// Product of what a list holds with the shape r² H, less constant and slope over the band around `hertz`, and the shape's norm. `None` if

@@ -239,6 +239,10 @@ pub fn a_browser_draws_it(panel: &Panel) {
     page.press("acknowledge");
     page.wait(&chip("disarmed"));
     page.fits("disarmed");
+    page.click("commission");
+    page.wait("document.querySelectorAll('#commission-steps .row').length > 5");
+    page.fits("commissioning");
+    page.value("document.querySelector('#panel-commission [data-close]').click()");
     // While disarmed there is no error, in the table and in the strips.
     page.wait("[...document.querySelectorAll('#readout .error span')].every(cell => cell.textContent === '–')");
     page.press("arm");

@@ -27,7 +27,7 @@ const LOWEST: f64 = 0.4;
 /// Deviation of a machine from the linear model, relative to the response: hysteresis depends on amplitude and history.
 const NONLINEAR: f64 = 0.02;
 /// Limits of a fitted damping ratio.
-pub(super) const RATIO: [f64; 2] = [5e-4, 0.4];
+pub(crate) const RATIO: [f64; 2] = [5e-4, 0.4];
 
 /// The frequency response and its surroundings at one frequency.
 pub(super) struct Point {
@@ -46,29 +46,54 @@ pub(super) struct Point {
 
 /// A mode that is fitted: ln f_n, ln ζ, a.
 #[derive(Clone, Copy)]
-pub(super) struct Resonance {
-    pub(super) place: Location,
-    pub(super) values: [f64; 3],
+pub(crate) struct Resonance {
+    pub(crate) place: Location,
+    pub(crate) values: [f64; 3],
 }
 
 impl Resonance {
     /// h at a frequency, Hz.
-    fn factor(&self, hertz: f64) -> Complex {
+    pub(crate) fn factor(&self, hertz: f64) -> Complex {
         let [frequency, ratio, part] = self.values;
         let flexure = if self.place.on_gauges() { Flexure::Sensor(part) } else { Flexure::Series };
         flexure.factor(hertz / libm::exp(frequency), libm::exp(ratio))
     }
 
-    fn of_leg(&self, leg: usize) -> bool {
+    /// Derivatives of ln h by its free parameters.
+    pub(crate) fn slopes(&self, hertz: f64) -> Vec<Complex> {
+        let step = 1e-6;
+        let slope = |k: usize| {
+            let [up, down] = [step, -step].map(|by| {
+                let mut mode = *self;
+                mode.values[k] += by;
+                mode.factor(hertz)
+            });
+            over([0, 1].map(|part| (up[part] - down[part]) / (2.0 * step)), self.factor(hertz))
+        };
+        (0..self.free()).map(slope).collect()
+    }
+
+    pub(crate) fn of_leg(&self, leg: usize) -> bool {
         self.place == Location::Legs || self.place == Location::Leg(leg)
     }
 
-    fn of_gauge(&self, gauge: usize) -> bool {
+    pub(crate) fn of_gauge(&self, gauge: usize) -> bool {
         self.place == Location::Gauges || self.place == Location::Gauge(gauge)
     }
 
+    /// Moves by the next numbers of a step.
+    pub(crate) fn step(&mut self, step: &mut impl Iterator<Item = f64>) {
+        // A longer one would leave the basin.
+        let free = self.free();
+        for (value, most) in self.values.iter_mut().zip([0.03, 0.7, 0.3]).take(free) {
+            *value += step.next().unwrap_or_default().clamp(-most, most);
+        }
+        let [lowest, highest] = RATIO.map(libm::log);
+        self.values[1] = self.values[1].clamp(lowest, highest);
+    }
+
     /// Number of its parameters.
-    fn free(&self) -> usize {
+    pub(crate) fn free(&self) -> usize {
         if self.place.on_gauges() { 3 } else { 2 }
     }
 }
@@ -284,16 +309,7 @@ impl Problem {
             all.push(by.plant.map(|row| row.map(|value| times(factor, value))));
         }
         for mode in &fit.modes {
-            for k in 0..mode.free() {
-                let moved = |by: f64| {
-                    let mut mode = *mode;
-                    mode.values[k] += by;
-                    mode.factor(point.hertz)
-                };
-                let step = 1e-6;
-                let (up, down) = (moved(step), moved(-step));
-                let slope = [(up[0] - down[0]) / (2.0 * step), (up[1] - down[1]) / (2.0 * step)];
-                let relative = over(slope, mode.factor(point.hertz));
+            for relative in mode.slopes(point.hertz) {
                 let of = |acts: &dyn Fn(usize) -> bool| -> [Complex; 6] {
                     std::array::from_fn(|k| if acts(k) { relative } else { [0.0; 2] })
                 };
@@ -405,16 +421,8 @@ impl Problem {
         for (k, value) in moved.platform.iter_mut().enumerate() {
             *value += step[k];
         }
-        let mut k = PLATFORM;
-        let [lowest, highest] = RATIO.map(libm::log);
-        for mode in &mut moved.modes {
-            // A longer step would leave the basin.
-            for (which, most) in [0.03, 0.7, 0.3].into_iter().enumerate().take(mode.free()) {
-                mode.values[which] += step[k].clamp(-most, most);
-                k += 1;
-            }
-            mode.values[1] = mode.values[1].clamp(lowest, highest);
-        }
+        let mut step = step.iter().copied().skip(PLATFORM);
+        moved.modes.iter_mut().for_each(|mode| mode.step(&mut step));
         moved
     }
 
@@ -447,11 +455,11 @@ impl Problem {
     }
 }
 
-pub(super) fn real(matrix: &Matrix6) -> Matrix6c {
+pub(crate) fn real(matrix: &Matrix6) -> Matrix6c {
     matrix.map(|row| row.map(|value| [value, 0.0]))
 }
 
-fn column(matrix: &Matrix6c, k: usize) -> [Complex; 6] {
+pub(crate) fn column(matrix: &Matrix6c, k: usize) -> [Complex; 6] {
     std::array::from_fn(|i| matrix[i][k])
 }
 

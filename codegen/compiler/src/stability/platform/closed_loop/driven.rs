@@ -41,6 +41,20 @@ impl ClosedLoop {
         found
     }
 
+    /// S at each of the angles ωT_s, in modal coordinates: the error of the pose that feedback leaves, per error that the readings would
+    /// have without it. S = I − C (z − A)⁻¹ B, with an error of the readings as the input; row by row, as (real, imaginary).
+    pub fn sensitivity(&self, law: ControlMode, tuning: &Tuning, angles: &[f64]) -> Vec<[[Complex; 6]; 6]> {
+        let shown = shown(self.lags_used()[1]);
+        let (transition, input) = self.driven(law, tuning, &Conditions::NOMINAL, true);
+        let mut resolvent = Resolvent::new(&transition, &input);
+        let mut at = |angle: &f64| {
+            let states = resolvent.at([libm::cos(*angle), libm::sin(*angle)]);
+            let of = |i: usize, j: usize| [f64::from(i == j) - states[shown + i][j][0], -states[shown + i][j][1]];
+            core::array::from_fn(|i| core::array::from_fn(|j| of(i, j)))
+        };
+        angles.iter().map(&mut at).collect()
+    }
+
     /// Readings at the end of each interval under open-loop requests, all in modal coordinates, from rest.
     pub fn without_feedback(&self, requests: &[[f64; 6]]) -> Vec<[f64; 6]> {
         let law = ControlMode::F(Law::Invhys);
