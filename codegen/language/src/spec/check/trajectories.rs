@@ -7,7 +7,7 @@ use crate::spec::keys::{self, MAX_TABLES};
 
 const OF_PAPER: [&str; 2] = ["frequency", "as_printed"];
 const OF_STEP: [&str; 2] = ["to", "time"];
-const OF_WAVEFORM: [&str; 3] = ["file", "period", "repeat"];
+const OF_WAVEFORM: [&str; 4] = ["file", "period", "repeat", "columns"];
 
 pub(super) fn keys_of_kind(f: &Fields, findings: &mut Findings) -> Option<()> {
     for index in 0..f.count("trajectory") {
