@@ -194,7 +194,10 @@ fn new(compiled: &Compilation) -> State {
 fn begun(options: &Options, new: State) -> Result<State, Failure> {
     let shown = options.output.display();
     let mut state = match State::read(&options.output)? {
-        None if options.report => new.of_records(&options.output),
+        None if options.report => {
+            let (grid, mains) = (options.grid.unwrap_or(new.grid), options.mains.unwrap_or(new.mains));
+            State { grid, mains, ..new }.of_records(&options.output)
+        }
         None => new,
         Some(state) if state.written.as_ref() == Some(&new.spec) => State { replacing: false, ..state },
         Some(_) if options.again && options.steps.is_empty() => new,
@@ -529,7 +532,7 @@ struct PlanReport {
 impl PlanReport {
     /// Of a check.
     fn check(state: &State) -> Self {
-        let seconds = response::seconds() + plan::seconds(&[Step::Wiring], &[]);
+        let seconds = plan::seconds(&[Step::Wiring, Step::Response], &[]);
         let (grid, mains) = (state.grid, state.mains);
         Self { steps: vec![Step::Response.name()], seconds, drives: 0, pairs: false, grid, mains }
     }

@@ -8,6 +8,7 @@ use specgen_language::output::write_file;
 
 use super::chart::{Axis, BLUE, Chart, DASHED, DOTS, INK, LINE, Note};
 use super::page::{Head, html};
+use super::plot::escaped;
 use super::section::{Part, Section};
 
 /// Files of the folder.
@@ -51,7 +52,26 @@ fn page(text: &str, state: &Value, folder: &Path) -> String {
         other: None,
     };
     let sections: Vec<Section> = parts.map(|part| section(part, state, folder)).collect();
-    html(&head, &[Part::Lines(lines(first.lines().skip(1)))], &sections, &[])
+    let heading = first.lines().next().unwrap_or_default().trim_start_matches("# ");
+    let beyond = text.lines().filter(|line| line.ends_with("MISSES")).count();
+    let rest = text.split_once("\n## Findings\n").map_or("", |(_, rest)| rest);
+    let findings = rest.lines().take_while(|line| !line.starts_with("## "));
+    let found = findings.filter(|line| line.starts_with("- ")).count();
+    let limits = counted(beyond, "figure beyond its limit", "figures beyond their limits");
+    let first = [
+        Part::Html(format!("<h1>{}</h1>", escaped(heading))),
+        Part::Lead(format!("Result: {limits}, {}.", counted(found, "finding", "findings"))),
+        Part::Lines(lines(first.lines().skip(1))),
+    ];
+    html(&head, &first, &sections, &[])
+}
+
+fn counted(count: usize, one: &str, many: &str) -> String {
+    match count {
+        0 => format!("no {many}"),
+        1 => format!("1 {one}"),
+        more => format!("{more} {many}"),
+    }
 }
 
 /// A section of the text, with its charts.
@@ -66,7 +86,7 @@ fn section(text: &str, state: &Value, folder: &Path) -> Section {
         "Before and after" => ("before", Vec::new()),
         "Acceptance" => ("acceptance", hold(folder).into_iter().collect()),
         "Sensitivity |S|" => ("sensitivity", vec![sensitivity(state)]),
-        "Learned" => ("learned", Vec::new()),
+        "LearnedFigure" => ("learned", Vec::new()),
         "Findings" => ("findings", Vec::new()),
         _ => ("more", Vec::new()),
     };
@@ -185,9 +205,16 @@ mod tests {
             std::fs::read_to_string(folder.path().join(PAGE)).unwrap()
         };
         let page = made();
-        for part in
-            ["leg 0 plays", "Reversal curves of leg 0", "Error at rest", "Largest |S| of the axes", "no. 7", "the end"]
-        {
+        for part in [
+            "<h1>Commissioning of stage</h1>",
+            "no figures beyond their limits, no findings",
+            "leg 0 plays",
+            "Reversal curves of leg 0",
+            "Error at rest",
+            "Largest |S| of the axes",
+            "no. 7",
+            "the end",
+        ] {
             assert!(page.contains(part), "{part}");
         }
         assert!(!page.contains("```") && page == made());

@@ -2,7 +2,7 @@
 //! same legs alone. Simulation.
 
 use super::machine::{Machine, TICK};
-use super::reference;
+use super::{reference, roomy};
 use specgen::everett::EverettTable;
 use specgen::identify::assembled::{Drive, Kind, Plan};
 use specgen::identify::{DeadTime, Options, Record, identify};
@@ -39,7 +39,8 @@ fn compared(found: &EverettTable, truth: &EverettTable) -> [f64; 3] {
 fn worst(machine: &Machine, pairs: bool, kind: LegModelKind) -> [[f64; 3]; 2] {
     let compiled = compile_text(&edited("reference.toml", &[])).unwrap();
     let gain = reference().stroke[0] / 100.0;
-    let planned = plan::of(&compiled, gain, 32, 50.0, pairs).unwrap_or_else(|failure| panic!("{}", failure.message()));
+    let single = plan::of(&compiled, gain, 32, 50.0, false).unwrap_or_else(|failure| panic!("{}", failure.message()));
+    let planned = if pairs { specgen::identify::assembled::plan(&roomy(), 32, true).unwrap() } else { single };
     let folder = scratch("assembled");
     machine.record(&planned, &folder);
     let coupling = legs::cross_talk(&folder, &planned).unwrap_or_else(|failure| panic!("{}", failure.message())).matrix;

@@ -61,7 +61,6 @@ struct Drawn {
 fn draft(more: &[(&str, &str)]) -> String {
     let edits = [
         ("records = [\"records/reference-forc.csv\"]", "records = []"),
-        ("stroke          = \"60 um\"", "stroke          = \"51 um\""),
         ("[\"50 um\", \"50 um\", \"52 um\"]", "[\"48 um\", \"46 um\", \"52 um\"]"),
         ("[\"0.4 mrad\", \"0.35 mrad\", \"0.5 mrad\"]", "[\"0.37 mrad\", \"0.325 mrad\", \"0.46 mrad\"]"),
         ("[\"-55 um\", \"55 um\"]", "[\"-62 um\", \"62 um\"]"),
@@ -289,7 +288,7 @@ fn perfect_records(drawn: &Drawn, compiled: &Compilation, plan: &Plan, [from, to
         let mut plant = LegPlant::new(&still);
         // Of the first record: gain of the assembled leg over the free one, and the displacement from which the gauges count.
         let mut fitted = None;
-        for drive in plan.drives.iter().filter(|drive| drive.legs == [leg] && drive.kind != Kind::CrossTalk) {
+        for drive in plan.drives.iter().filter(|drive| drive.legs.contains(&leg) && drive.kind != Kind::CrossTalk) {
             plant.hold(drive.voltage(0.0), drive.rest_before);
             let ticks = (drive.seconds() / period).round() as i64;
             if drive.kind == Kind::Preconditioning {
@@ -299,10 +298,8 @@ fn perfect_records(drawn: &Drawn, compiled: &Compilation, plan: &Plan, [from, to
                 continue;
             }
             let text = fs::read_to_string(from.join(format!("{}.csv", drive.name))).unwrap();
-            let mut lines = text.lines();
-            let title = lines.next().unwrap();
-            let table: Vec<Vec<f64>> =
-                lines.map(|line| line.split(',').map(|cell| cell.parse().unwrap()).collect()).collect();
+            let title = text.lines().next().unwrap();
+            let table = rows_of(&text);
             let first = drive.first_tick(&table.iter().map(|row| row[3 + leg]).collect::<Vec<_>>());
             let mut displaced = Vec::with_capacity(table.len());
             for row in 0..table.len() {
@@ -322,15 +319,25 @@ fn perfect_records(drawn: &Drawn, compiled: &Compilation, plan: &Plan, [from, to
                 let scale = both / square;
                 [scale, zero - measured / scale]
             });
+            let path = to.join(format!("{}.csv", drive.name));
+            // Of a leg that moves together with this one.
+            let other = fs::read_to_string(&path).ok().filter(|_| drive.legs[0] != leg);
+            let other: Vec<Vec<f64>> = other.map_or_else(Vec::new, |text| rows_of(&text));
             let mut perfect = format!("{title}\n");
-            for (row, displaced) in table.iter().zip(&displaced) {
-                let legs = (0..6).map(|k| if k == leg { scale * (displaced - zero) } else { 0.0 });
+            for (number, (row, displaced)) in table.iter().zip(&displaced).enumerate() {
+                let known = |k: usize| other.get(number).map_or(0.0, |row| row[9 + k]);
+                let legs = (0..6).map(|k| if k == leg { scale * (displaced - zero) } else { known(k) });
                 let cells: Vec<String> = row[..9].iter().copied().chain(legs).map(|cell| format!("{cell:e}")).collect();
                 perfect += &(cells.join(",") + "\n");
             }
-            fs::write(to.join(format!("{}.csv", drive.name)), perfect).unwrap();
+            fs::write(path, perfect).unwrap();
         }
     }
+}
+
+/// The numbers of a record.
+fn rows_of(text: &str) -> Vec<Vec<f64>> {
+    text.lines().skip(1).map(|line| line.split(',').map(|cell| cell.parse().unwrap()).collect()).collect()
 }
 
 /// Case 1 at 10 Hz, rms of the error of x, y, z by the gauges, m; none if the machine does not follow it to its end.
@@ -359,7 +366,7 @@ fn case_1(drawn: &Drawn, compiled: &Compilation, watch: &mut Watch) -> Option<f6
 }
 
 /// What was found of a machine.
-struct Found {
+struct Figures {
     /// Cross-talk left at a full stroke, m.
     left: f64,
     /// Case 1 at 10 Hz, m: commissioned, and with the true models.
@@ -374,7 +381,7 @@ fn written(folder: &Path, text: &str) -> Compilation {
     compile(&path).unwrap_or_else(|refused| panic!("{:#?}", refused.findings))
 }
 
-fn commissioned(number: u64, grid: usize) -> Found {
+fn commissioned(number: u64, grid: usize) -> Figures {
     let name = format!("commissioning-{grid}-{number}");
     let folder = scratch(&name);
     let truth = folder.join("truth");
@@ -383,7 +390,7 @@ fn commissioned(number: u64, grid: usize) -> Found {
     let compiled = Arc::new(written(&folder, &text));
     let drawn = drawn(&compiled.model, number);
     let plan = commission::planned(&compiled, grid, MAINS).unwrap();
-    let mut found = Found { left: 0.0, errors: [None; 2], watch: Watch::default() };
+    let mut found = Figures { left: 0.0, errors: [None; 2], watch: Watch::default() };
 
     let mut machine = drawn.driving(&compiled, false);
     for drive in &plan.drives {
@@ -397,22 +404,20 @@ fn commissioned(number: u64, grid: usize) -> Found {
     found.left = left(&new.model.actuator.cross_talk.unwrap(), &whole.matrix);
 
     perfect_records(&drawn, &compiled, &plan, [&folder, &truth], &whole.matrix);
-    // Legs that move together need their cross-talk.
+    // The legs of these records are not coupled.
     let line = "\naxial_stiffness =";
-    let coupled = text.replacen(line, &format!("\ncross_talk = {:?}{line}", whole.matrix), 1);
-    commission(&written(&truth, &coupled), &truth, kind, &[Step::Curves, Step::Identify, Step::Spec]);
+    let apart = text.replacen(line, &format!("\ncross_talk = {:?}{line}", [[0.0; 6]; 6]), 1);
+    commission(&written(&truth, &apart), &truth, kind, &[Step::Curves, Step::Identify, Step::Spec]);
     let known = fs::read_to_string(truth.join("platform.toml")).unwrap();
     let Model { amplifier, platform, actuator, .. } = &compiled.model;
     let [lag, mass, stiffness] = drawn.ratios;
     let inertia = platform.inertia.map(|entry| format!("\"{:e} kg m^2\"", mass * entry)).join(", ");
     let lines = [
+        ("\ncross_talk =", format!("\ncross_talk = {:?}", whole.matrix)),
         ("\nlag   =", format!("\nlag   = \"{:e} s\"", lag * amplifier.lag)),
         ("\nmass           =", format!("\nmass           = \"{:e} kg\"", mass * platform.mass)),
         ("\ninertia        =", format!("\ninertia        = [{inertia}]")),
-        (
-            "\naxial_stiffness =",
-            format!("\naxial_stiffness = \"{:e} N/m\"", stiffness * actuator.axial_stiffness),
-        ),
+        ("\naxial_stiffness =", format!("\naxial_stiffness = \"{:e} N/m\"", stiffness * actuator.axial_stiffness)),
     ];
     let known = lines.iter().fold(known, |text, (start, line)| {
         let (before, rest) = text.split_once(start).unwrap_or_else(|| panic!("{start}"));
@@ -436,7 +441,7 @@ fn machines_drawn_at_random_are_commissioned() {
     let (machines, grid) = (of("SPECGEN_MACHINES").unwrap_or(length(1, 30)), of("SPECGEN_GRID").unwrap_or(8));
     let mut ratios = Vec::new();
     for number in 0..machines as u64 {
-        let Found { left, errors, watch } = commissioned(number, grid);
+        let Figures { left, errors, watch } = commissioned(number, grid);
         let [own, truth] = errors.map(|error| error.map_or(f64::NAN, |error| error * 1e9));
         println!(
             "machine {number}, legs of class {}: cross-talk left {:.2} nm; case 1 at 10 Hz {own:.1} nm, with the true models {truth:.1} nm; \

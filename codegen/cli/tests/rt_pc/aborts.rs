@@ -52,11 +52,11 @@ enum Abort {
 
 /// A host takes a minute to give up a silent socket: such aborts are fewer.
 const ABORTS: [Abort; 5] = [Abort::Interrupt, Abort::Program, Abort::Power, Abort::Kill, Abort::Cut];
-const SILENCES: usize = 50;
+const SILENCES: usize = 100;
 
 /// A step, whether it is done again, and the time within which it is aborted, s.
 const STEPS: [(&str, bool, f64); 4] =
-    [("wiring", true, 8.0), ("cross-talk", false, 13.0), ("curves", false, 8.0), ("acceptance", true, 8.0)];
+    [("wiring", true, 6.5), ("cross-talk", false, 12.0), ("curves", false, 6.0), ("acceptance", true, 6.0)];
 
 /// What a machine permits.
 struct Permitted {
@@ -87,7 +87,7 @@ impl Permitted {
 
 /// What the machine was sent.
 #[derive(Default)]
-struct Seen {
+struct Observation {
     /// Ticks of all sessions.
     ticks: u64,
     last: Actuation,
@@ -99,7 +99,7 @@ struct Seen {
     wrong: Vec<String>,
 }
 
-impl Seen {
+impl Observation {
     fn take(&mut self, now: &Actuation, permitted: &Permitted) {
         let same = now.session == self.last.session;
         let passed = if same { now.tick.saturating_sub(self.last.tick) } else { 1 };
@@ -171,7 +171,7 @@ struct Bench {
     spec: PathBuf,
     compiled: Arc<Compilation>,
     name: String,
-    seen: Arc<Mutex<Seen>>,
+    seen: Arc<Mutex<Observation>>,
     power: Arc<AtomicBool>,
     link: Arc<AtomicU8>,
     program: Option<ProcessGuard>,
@@ -183,7 +183,7 @@ impl Bench {
     fn new(spec: &Path) -> Self {
         let (folder, compiled) = (tempfile::tempdir().unwrap(), Arc::new(compile::compile(spec).unwrap()));
         let name = format!("test-aborts-{}", std::process::id());
-        let seen = Arc::<Mutex<Seen>>::default();
+        let seen = Arc::<Mutex<Observation>>::default();
         let (power, link) = (Arc::new(AtomicBool::new(true)), Arc::new(AtomicU8::new(0)));
         let server = Server::create(&path_of(&name).unwrap(), &compiled.ir.digest).unwrap();
         let serves = {
@@ -203,7 +203,7 @@ impl Bench {
         self.folder.path().join(name)
     }
 
-    fn seen<R>(&self, look: impl FnOnce(&Seen) -> R) -> R {
+    fn seen<R>(&self, look: impl FnOnce(&Observation) -> R) -> R {
         look(&self.seen.lock().unwrap())
     }
 
@@ -342,7 +342,7 @@ fn assert_ended(output: &Output, abort: Abort, what: &str) {
 }
 
 /// Answers the program until `over`, except without power.
-fn serve(server: &Server, compiled: &Compilation, seen: &Mutex<Seen>, power: &AtomicBool, over: &AtomicBool) {
+fn serve(server: &Server, compiled: &Compilation, seen: &Mutex<Observation>, power: &AtomicBool, over: &AtomicBool) {
     let plant = PlantOptions { plant: None, no_noise: false, seed: 1 };
     let rig = plant.platform(&compiled.model, compiled.model.task_space.as_ref().unwrap()).unwrap().1.rig().clone();
     let mut served = PlantServer::new(Machine::Platform(Box::new(rig)), &compiled.model, &compiled.ir);

@@ -1,5 +1,5 @@
 //! Figures of the machine with its new controller, from records of its closed loop: at rest, a step, a circle, the trajectories of the
-//! spec, and |S|. Errors are those of the gauges: set-point less measured pose, tick by tick. Each stands beside that of the simulated
+//! spec, and |S|. Errors are those of the gauges: set-point less measured pose, tick by tick. Each is shown beside that of the simulated
 //! machine with the legs that were identified.
 
 use std::path::Path;

@@ -12,7 +12,7 @@ use specgen_language::ui::Ui;
 use specgen_studies::lessons::Options;
 use specgen_studies::machine::PlantOptions;
 
-use super::state::Learned;
+use super::state::LearnedFigure;
 use crate::learning;
 use crate::line::Line;
 
@@ -85,7 +85,7 @@ pub(super) fn learn(
 ///
 /// # Errors
 /// A file cannot be read.
-pub(super) fn figures(folder: &Path, compiled: &Compilation) -> Result<Vec<Learned>, Failure> {
+pub(super) fn figures(folder: &Path, compiled: &Compilation) -> Result<Vec<LearnedFigure>, Failure> {
     let mut all = Vec::new();
     for name in names(compiled) {
         let path = folder.join(passes(name));
@@ -97,7 +97,7 @@ pub(super) fn figures(folder: &Path, compiled: &Compilation) -> Result<Vec<Learn
         let found: Value = serde_json::from_str(&text).map_err(|_| lost())?;
         let error = |pass: u64| Some(1e-9 * found["passes"][usize::try_from(pass).ok()?]["translation_nm"].as_f64()?);
         let best = found["best"].as_u64().ok_or_else(lost)?;
-        all.push(Learned {
+        all.push(LearnedFigure {
             trajectory: name.to_owned(),
             before: error(0).ok_or_else(lost)?,
             after: error(best).ok_or_else(lost)?,

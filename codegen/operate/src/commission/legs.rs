@@ -26,7 +26,7 @@ use super::state::{Coupling, Leg, record};
 const PLANNED: f64 = 0.02;
 
 /// What was identified of a leg, and the rms error of its model on the arbitrary record, m.
-pub type Found = (Choice, Option<f64>);
+pub type LegResult = (Choice, Option<f64>);
 
 /// E of the legs that are coupled in their records.
 ///
@@ -55,7 +55,7 @@ pub fn models(
     plan: &Plan,
     (coupling, delays): (&[[f64; 6]; 6], &[f64; 6]),
     kind: LegModelKind,
-) -> Result<Vec<Found>, Failure> {
+) -> Result<Vec<LegResult>, Failure> {
     let cells = compiled.model.hysteresis.grid;
     let read = |leg: usize| LegRecords::read(folder, (plan, cells), leg, (coupling, delays[leg]));
 
@@ -79,7 +79,7 @@ pub(super) fn write(
     folder: &Path,
     compiled: &Compilation,
     plan: &Plan,
-    found: Vec<Found>,
+    found: Vec<LegResult>,
     ui: &mut Ui,
 ) -> Result<Vec<Leg>, Failure> {
     let mut legs = Vec::new();
@@ -152,7 +152,7 @@ impl LegRecords {
         Ok(all)
     }
 
-    fn identify(&self, compiled: &Compilation, kind: LegModelKind) -> Result<Found, Vec<Diagnostic>> {
+    fn identify(&self, compiled: &Compilation, kind: LegModelKind) -> Result<LegResult, Vec<Diagnostic>> {
         let drive = compiled.model.actuator.voltage;
         let options =
             Options { dead_time: DeadTime::Fixed(0.0), ..Options::new(compiled.model.hysteresis.grid, drive) };

@@ -12,7 +12,7 @@ use specgen_language::ui::Ui;
 use specgen_link::client::Port;
 use specgen_runtime::supervisor::{Finding, Phase, Request};
 
-use super::plan::MARGIN;
+use super::plan;
 use crate::command::{Command, WaitCondition};
 use crate::commands::{Operator, SessionError, lost_link};
 use crate::line::Line;
@@ -132,6 +132,6 @@ pub(super) fn play(machine: &mut Machine, drive: &Drive, path: &Path, ui: &Ui) -
         start(machine)?;
         return rest(machine, drive.seconds() + ENDED, ui);
     }
-    let spans = [MARGIN, drive.seconds() + MARGIN];
+    let spans = [plan::REST, drive.seconds() + plan::REST];
     machine.record_rows((drive.average, drive.average), spans, path, &mut start, ui)
 }

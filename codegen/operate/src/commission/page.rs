@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use specgen_language::table::{left, right, row};
 
 use super::findings::findings;
-use super::state::{Figure, Learned, Leg, State, Step};
+use super::state::{Figure, LearnedFigure, Leg, State, Step};
 use crate::place::AXES;
 
 /// Width of the page, in characters.
@@ -15,7 +15,7 @@ const NOT_FOUND: &str = "Not found in place: the absolute sensitivity of the gau
 of all legs) needs a reference: record a gauge beside one over its range, and give both to `specgen identify gauge`. Mass and \
 stiffness: only their ratio shows in modes.";
 /// How figures are judged.
-const ACCEPTED: &str = "By the gauges, rms unless said otherwise. Computed: the same motions on the simulated machine, each leg its \
+const ACCEPTED: &str = "By the gauges, rms unless noted. Computed: the same motions on the simulated machine, each leg its \
 identified model, off by its error on the arbitrary record.";
 const SENSITIVE: &str = "Error with feedback over error without it, for waves of the set-point along each axis; computed: the loop of \
 the spec, for the same directions. Feed-forward is the same in both runs, so it cancels. m: beside a mode.";
@@ -219,10 +219,10 @@ fn learned(state: &State, text: &mut String) {
     if state.learned.is_empty() {
         return;
     }
-    let _ = writeln!(text, "\n## Learned\n\n```text");
+    let _ = writeln!(text, "\n## LearnedFigure\n\n```text");
     let columns = [left(24), right(13), right(13), right(8), left(0).behind("  ")];
     row(text, &columns, &[&"trajectory, xyz", &"before", &"after", &"passes", &"correction"]);
-    for Learned { trajectory, before, after, passes, correction } in &state.learned {
+    for LearnedFigure { trajectory, before, after, passes, correction } in &state.learned {
         row(text, &columns, &[trajectory, &nano(0, *before), &nano(0, *after), passes, correction]);
     }
     *text += "```\n";
@@ -267,7 +267,7 @@ mod tests {
         state.sensitivity = vec![sensitivity(Some(0))];
         state.rest = vec![Rest { rms: [123.45e-9; 6], mains: [0.0; 6], gauges: [0.0; 6], lines: Vec::new() }; 2];
         state.written = Some("0".repeat(64));
-        state.learned = vec![Learned {
+        state.learned = vec![LearnedFigure {
             trajectory: "case-1".to_owned(),
             before: 8e-9,
             after: 4e-9,

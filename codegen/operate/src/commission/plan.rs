@@ -5,11 +5,13 @@ use specgen_compiler::lower;
 use specgen_identify::assembled::{self, Bench, Drive, Kind, Plan};
 use specgen_language::outcome::Failure;
 
-use super::response;
 use super::state::Step;
 
-/// Rest before and after a drive in its record, s.
+/// Rest before and after a motion of acceptance, and before and after a drive in its record, s.
 pub(super) const MARGIN: f64 = 1.0;
+pub(super) const REST: f64 = 0.6;
+/// Time of the response of all legs, s, with the downloads over a serial line.
+const RESPONSE: f64 = 90.0;
 /// Part of the voltage that curves may leave out.
 const SHORT: f64 = 1e-2;
 
@@ -116,14 +118,14 @@ pub(super) fn seconds(steps: &[Step], drives: &[&Drive]) -> f64 {
     let beside = |step: &Step| match step {
         // Arming, noise, ramp-down.
         Step::Wiring => 20.0,
-        Step::Response => response::seconds(),
+        Step::Response => RESPONSE,
         // With |S|, and trajectories of some seconds.
         Step::Acceptance => 100.0,
         Step::Identify | Step::Spec => 0.0,
         _ if drives.iter().any(|drive| step_of(drive) == *step) => 10.0,
         _ => 0.0,
     };
-    let margins = |drive: &Drive| if drive.kind == Kind::Preconditioning { 0.0 } else { 2.0 * MARGIN };
+    let margins = |drive: &Drive| if drive.kind == Kind::Preconditioning { 0.0 } else { 2.0 * REST };
     let of_drives = drives.iter().fold(0.0, |sum, drive| sum + drive.duration() + margins(drive));
     steps.iter().fold(of_drives, |sum, step| sum + beside(step))
 }
@@ -164,7 +166,7 @@ mod tests {
         let left = open(&plan, &steps, |drive| !missing.contains(&drive.name.as_str()));
         let names: Vec<&str> = left.iter().map(|drive| drive.name.as_str()).collect();
         assert_eq!(names, ["leg1-preconditioning", missing[0], missing[1]]);
-        let expected: f64 = left.iter().map(|drive| drive.duration()).sum::<f64>() + 2.0 * 2.0 * MARGIN + 10.0;
+        let expected: f64 = left.iter().map(|drive| drive.duration()).sum::<f64>() + 2.0 * 2.0 * REST + 10.0;
         assert!((seconds(&steps, &left) - expected).abs() < 1e-9);
         assert_eq!(seconds(&[Step::Curves, Step::Spec], &[]), 0.0);
     }

@@ -39,8 +39,6 @@ const LEAST_DEAD_TIME: f64 = 0.25;
 const SHARE: [f64; 2] = [0.3, 0.5];
 /// Part of its swing by which the voltage moves when the strokes begin.
 const BEGUN: f64 = 0.02;
-/// Time for one leg, s, with the download over a serial line.
-const LEG: f64 = 15.0;
 /// Standard errors, and least differences, that count as a disagreement: stiffness over mass, damping, lag over that of the spec.
 const SURE: f64 = 3.0;
 const LEAST: [f64; 3] = [0.02, 0.1, 0.05];
@@ -48,11 +46,6 @@ const LEAST: [f64; 3] = [0.02, 0.1, 0.05];
 /// Name of the record of a sweep, and of strokes.
 fn names(prefix: &str, leg: usize) -> [String; 2] {
     [format!("{prefix}-leg{leg}"), format!("{prefix}-strokes-leg{leg}")]
-}
-
-/// Machine time of all legs, s.
-pub(super) fn seconds() -> f64 {
-    6.0 * LEG
 }
 
 /// Removes the records of a response.

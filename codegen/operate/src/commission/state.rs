@@ -180,7 +180,7 @@ pub(super) struct Sensitivity {
 
 /// A trajectory that was learned: error by the gauges in its first pass and in that of the correction that is kept, m rms.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(super) struct Learned {
+pub(super) struct LearnedFigure {
     pub trajectory: String,
     pub before: f64,
     pub after: f64,
@@ -231,7 +231,7 @@ pub(super) struct State {
     #[serde(default)]
     pub sensitivity: Vec<Sensitivity>,
     #[serde(default)]
-    pub learned: Vec<Learned>,
+    pub learned: Vec<LearnedFigure>,
 }
 
 impl State {

@@ -32,7 +32,7 @@ pub(super) struct Runner {
     given: Commissioning,
     thread: Option<JoinHandle<Result<(), String>>>,
     /// Its last line.
-    said: Arc<Mutex<String>>,
+    message: Arc<Mutex<String>>,
     /// How it ended, unless it is done.
     ended: Option<String>,
     outlook: Value,
@@ -41,7 +41,7 @@ pub(super) struct Runner {
 
 impl Runner {
     pub fn new(given: Commissioning) -> Self {
-        Self { given, thread: None, said: Arc::default(), ended: None, outlook: Value::Null, looked: None }
+        Self { given, thread: None, message: Arc::default(), ended: None, outlook: Value::Null, looked: None }
     }
 
     pub fn runs(&self) -> bool {
@@ -55,11 +55,11 @@ impl Runner {
         }
         self.given.stop.store(false, Ordering::Relaxed);
         self.ended = None;
-        let (run, said) = (self.given.run.clone(), self.said.clone());
+        let (run, last) = (self.given.run.clone(), self.message.clone());
         self.thread = Some(std::thread::spawn(move || {
             let listener = move |message: Message<'_>| {
                 if let Message::Progress(line) = message {
-                    line.clone_into(&mut said.lock().unwrap_or_else(PoisonError::into_inner));
+                    line.clone_into(&mut last.lock().unwrap_or_else(PoisonError::into_inner));
                 }
             };
             run(&mut Ui::called(listener, None)).map_err(|failure| failure.message())
@@ -89,10 +89,10 @@ impl Runner {
             self.looked = Some(Instant::now());
             self.outlook = (self.given.outlook)().unwrap_or_else(|failure| json!({ "refused": failure.message() }));
         }
-        let said = self.said.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        let message = self.message.lock().unwrap_or_else(PoisonError::into_inner).clone();
         let folder = self.given.folder.display().to_string();
         let state = json!({
-            "runs": self.runs(), "said": said, "ended": self.ended, "folder": folder, "outlook": self.outlook,
+            "runs": self.runs(), "message": message, "ended": self.ended, "folder": folder, "outlook": self.outlook,
         });
         (state, event)
     }

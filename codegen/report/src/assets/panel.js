@@ -317,7 +317,7 @@
     const why = plan.refused || (open.length ? "" : plan.other ? "build and start the new controller" : "all steps are done");
     allow(by("commission-begin"), now.runs ? "running" : phase !== "disarmed" ? "ramp down first" : why ? why : control, "press 1\u2009s");
     allow(by("commission-end"), now.runs ? "" : "not running");
-    by("commission-said").textContent = now.runs ? now.said : now.ended ? "Ended: " + now.ended : "";
+    by("commission-said").textContent = now.runs ? now.message : now.ended ? "Ended: " + now.ended : "";
     const page = by("commission-page");
     page.hidden = !plan.page;
     page.href = "/commission" + location.search;
