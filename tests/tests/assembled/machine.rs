@@ -104,8 +104,8 @@ impl Machine {
                 let seconds = every as f64 * TICK;
                 let seen = self.lengths(&moved, begun + (row as f64 + 0.5) * seconds, seconds, &mut noise);
                 let _ = write!(text, "{},{:.9},{every},6", row * every, row as f64 * seconds);
-                for leg in 0..6 {
-                    let volts = if drive.legs.contains(&leg) { volts[leg] } else { drive.held[leg] };
+                for (leg, held) in drive.held.iter().enumerate() {
+                    let volts = if drive.legs.contains(&leg) { volts[leg] } else { *held };
                     let _ = write!(text, ",{:e}", volts as f32);
                 }
                 seen.iter().for_each(|length| drop(write!(text, ",{:e}", *length as f32)));

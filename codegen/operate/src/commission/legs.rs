@@ -58,7 +58,6 @@ pub fn models(
 ) -> Result<Vec<LegResult>, Failure> {
     let cells = compiled.model.hysteresis.grid;
     let read = |leg: usize| LegRecords::read(folder, (plan, cells), leg, (coupling, delays[leg]));
-
     let sets = (0..6).map(read).collect::<Result<Vec<_>, _>>()?;
     let done: Vec<_> = std::thread::scope(|scope| {
         let work: Vec<_> = sets.iter().map(|leg| scope.spawn(move || leg.identify(compiled, kind))).collect();
@@ -132,22 +131,19 @@ impl LegRecords {
         let mut all = Self { nodes: None, curves: Vec::new(), arbitrary: None };
         for drive in records(plan, leg) {
             let (read, first) = read_record(&record(folder, &drive.name), drive, (leg, coupling), delay)?;
-            match drive.kind {
-                Kind::Arbitrary { .. } => all.arbitrary = Some(read),
-                _ => {
-                    let levels = if let Kind::Curves { grid, .. } = drive.kind { grid } else { 0 };
-                    // Between nodes of the table there is none of the drive's.
-                    if all.curves.is_empty()
-                        && levels % cells == 0
-                        && let Some([time, volts, displacement]) =
-                            drive.nodes(first, &read.displacement, delay, plan.mains)
-                    {
-                        let nodes = Record::from_columns(&read.shown_as, time, volts, displacement);
-                        all.nodes = Some(nodes.map_err(refused)?);
-                    }
-                    all.curves.push(read);
-                }
+            let Kind::Curves { grid, .. } = drive.kind else {
+                all.arbitrary = Some(read);
+                continue;
+            };
+            // Between their nodes fewer curves show nothing.
+            if all.curves.is_empty()
+                && grid.is_multiple_of(cells)
+                && let Some([time, volts, displacement]) = drive.nodes(first, &read.displacement, delay, plan.mains)
+            {
+                let nodes = Record::from_columns(&read.shown_as, time, volts, displacement);
+                all.nodes = Some(nodes.map_err(refused)?);
             }
+            all.curves.push(read);
         }
         Ok(all)
     }

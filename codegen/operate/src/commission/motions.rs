@@ -31,6 +31,8 @@ const TURNS: f64 = 2.0;
 /// Rest after the move to the start of a motion, s, and timeout of that move.
 pub(super) const AFTER_MOVE: f64 = 0.5;
 const MOVE: Duration = Duration::from_secs(60);
+/// A motion begins at most so long after the rest in its record, s: on a busy computer.
+pub(super) const LATE: f64 = 1.0;
 /// Names of records of trajectories, one of which may be called `hold`, begin with this.
 pub(super) const TRAJECTORY: &str = "trajectory-";
 
@@ -101,6 +103,10 @@ impl Motion {
         };
         let every = libm::round(row / machine.session.period()) as u32;
         machine.record_rows((every.max(1), u32::MAX), *spans, &self.path(folder), &mut begin, ui)?;
+        if wave.is_some() {
+            // It began as late as the link was.
+            rest(machine, LATE, ui)?;
+        }
         if matches!(kind, MotionKind::Trajectory(_)) {
             machine.execute(&Command::Set(vec![("command".to_owned(), "hold".to_owned())]), ui)?;
         }

@@ -29,16 +29,15 @@ const STROKE: (f64, f64, f64, u32) = (20.0, 0.4, 0.5, 2);
 /// Smooth start and end of the strokes, s, and rest before and after them.
 const RAMP: f64 = 0.05;
 const MARGIN: f64 = 0.3;
-/// Longest row of their record, s.
-const ROW: f64 = 20e-3;
+/// Row of their record, s, and the longest, in rows: a wave begins anywhere in a row.
+const ROW: f64 = 5e-3;
+const LONGEST: u32 = 4;
 /// Rest after the strokes: the fastest creep is over, s.
 const REST: f64 = 1.0;
 /// Least dead time that counts, ticks.
 const LEAST_DEAD_TIME: f64 = 0.25;
 /// Part of the smallest workspace that strokes may take, and of the slew rate.
 const SHARE: [f64; 2] = [0.3, 0.5];
-/// Part of its swing by which the voltage moves when the strokes begin.
-const BEGUN: f64 = 0.02;
 /// Standard errors, and least differences, that count as a disagreement: stiffness over mass, damping, lag over that of the spec.
 const SURE: f64 = 3.0;
 const LEAST: [f64; 3] = [0.02, 0.1, 0.05];
@@ -92,7 +91,7 @@ pub(super) fn measure(
         let (spans, rows) = ([MARGIN, seconds + MARGIN], record(folder, &strokes));
         // Of an interrupted run.
         remove(&rows).map_err(SessionError::Failed)?;
-        machine.record_rows((every, every), spans, &rows, &mut start, ui)?;
+        machine.record_rows((every, LONGEST * every), spans, &rows, &mut start, ui)?;
         rest(machine, REST, ui)?;
 
         let words = machine.wave_of_text(&sweep_of(compiled, &sweep, leg)).map_err(SessionError::Refused)?;
@@ -162,19 +161,10 @@ pub(super) fn found(folder: &Path, prefix: &str, compiled: &Compilation, date: &
     Ok(Response { found, strokes, date: date.to_owned(), agreement: Vec::new() }.judged(compiled))
 }
 
-/// Displacement of a leg per volt in the second half of its strokes, m/V.
+/// Displacement of a leg per volt in the second of its strokes, m/V.
 fn gain(rows: &Rows, leg: usize) -> Result<f64, Failure> {
-    let (time, legs) = (rows.time()?, rows.legs()?);
-    let volts = rows.column(&format!("volts[{leg}]_mean_V"))?;
-    // From the middle of the strokes on, wherever the link let them begin.
-    let [low, high] = volts.iter().fold([f64::INFINITY, -f64::INFINITY], |[low, high], v| {
-        [if *v < low { *v } else { low }, if *v > high { *v } else { high }]
-    });
-    let moves = |v: &f64| (v - volts[0]).abs() > BEGUN * (high - low);
-    let [begun, ended] = [volts.iter().position(moves), volts.iter().rposition(moves)].map(Option::unwrap_or_default);
-    let first = time.partition_point(|t| *t < 0.5 * (time[begun] + time[ended]));
-    let last = ended + 1;
-    gain_of_strokes(&volts[first..last], &legs[leg][first..last]).ok_or_else(|| {
+    let (legs, volts) = (rows.legs()?, rows.column(&format!("volts[{leg}]_mean_V"))?);
+    gain_of_strokes(volts, legs[leg]).ok_or_else(|| {
         Failure::Gate(format!("leg {leg} was not driven in its record of strokes: record it again with --again"))
     })
 }

@@ -22,7 +22,7 @@ use specgen_runtime::{ControlMode, Law};
 use specgen_studies::learning::Learnable;
 
 use super::machine::{Machine, rest};
-use super::motions::{Motion, MotionKind, SHARE, SIZE};
+use super::motions::{LATE, Motion, MotionKind, SHARE, SIZE};
 use super::rows::Rows;
 use super::state::Sensitivity;
 use crate::commands::{SessionError, is_gain};
@@ -159,7 +159,7 @@ impl<'a> Experiment<'a> {
             name: format!("sensitivity-{name}-{run}"),
             start: self.home,
             kind: MotionKind::Wave(self.wave(axis)),
-            spans: [lead, long + 2.0 * ramp + 0.1],
+            spans: [lead, long + 2.0 * ramp + LATE],
             row: if every > 1.0 { every * period } else { period },
             figures: Vec::new(),
         };
@@ -223,11 +223,18 @@ impl<'a> Experiment<'a> {
 
     /// Errors of the axes at the tones of a record of the wave along `axis`, in the user's coordinates.
     fn errors(&self, rows: &Rows, axis: usize) -> Result<Phasors, Failure> {
-        let [lead, ramp, long] = TIMES;
-        // The wave begins some ms after the rest.
-        let begun = lead + ramp + 0.05;
-        let span = rows.span([begun, begun + long - 0.05])?;
-        let (time, period) = (rows.time()?, rows.period()?);
+        let [_, ramp, long] = TIMES;
+        let (time, period, target) = (rows.time()?, rows.period()?, rows.axes("target", "")?);
+        // The wave begins when the link has passed it on.
+        let first = target[axis].iter().position(|value| (value - target[axis][0]).abs() > 0.0);
+        let begun = first.map_or(f64::INFINITY, |row| time[row]) + ramp;
+        let span = rows.span([begun, begun + long])?;
+        if begun + long > time[time.len() - 1] {
+            return Err(Failure::Gate(format!(
+                "a wave of |S| along {} is not whole in its record: repeat acceptance with --again, on a less busy computer",
+                AXES[axis]
+            )));
+        }
         let time = &time[span.clone()];
         let pi = core::f64::consts::TAU;
         let mut columns: Vec<Vec<f64>> = Vec::new();
@@ -254,7 +261,7 @@ impl<'a> Experiment<'a> {
             Ok::<_, Failure>((tones, noise))
         };
         let every = rows.column("ticks")?[0];
-        let (errors, target) = (rows.axes("error", "_mean")?, rows.axes("target", "")?);
+        let errors = rows.axes("error", "_mean")?;
         let (moves, _) = phasors(&target[axis][span.clone()])?;
         let mut found = Phasors { tones: vec![[[0.0; 2]; 6]; count], noise: [0.0; 6] };
         for (other, values) in errors.iter().enumerate() {

@@ -13,6 +13,8 @@ const DAMPING: f64 = 0.2;
 /// Other modes are the same within this part of their frequency; less participation in both is not compared.
 const SAME: f64 = 0.03;
 const LEAST_PART: f64 = 0.06;
+/// A leg is driven above this part of its stroke.
+const DRIVEN: f64 = 0.01;
 /// Gains changed together if each by this part of the mean.
 const TOGETHER: f64 = 0.6;
 
@@ -134,9 +136,18 @@ impl Health {
     }
 }
 
-/// Displacement per volt in a record of strokes, m/V, without a drift; rows are evenly spaced. None if nothing was driven.
+/// Displacement per volt in the second half of a record of strokes between two rests, m/V, without a drift; rows are evenly spaced, and
+/// the strokes begin anywhere in a row. None if nothing was driven.
 #[must_use]
 pub fn gain_of_strokes(volts: &[f64], moved: &[f64]) -> Option<f64> {
+    let rest = *volts.first()?;
+    let height = |volts: &f64| (volts - rest).abs();
+    let most = volts.iter().map(height).fold(0.0, |most, one| if one > most { one } else { most });
+    let drives = |volts: &f64| height(volts) > DRIVEN * most;
+    let (first, last) = (volts.iter().position(drives)?, volts.iter().rposition(drives)?);
+    // Two strokes meet at rest in the middle.
+    let second = usize::midpoint(first, last)..=last;
+    let (volts, moved) = (volts.get(second.clone())?, moved.get(second)?);
     let count = volts.len() as f64;
     let middle = 0.5 * (count - 1.0);
     let still = |values: &[f64]| -> Vec<f64> {

@@ -47,6 +47,10 @@ struct Machine {
     other: StructuralMode,
     /// Readings over the true ones.
     gauges: [f64; 6],
+    /// Legs per reading.
+    per_reading: Matrix6<f64>,
+    /// Ticks by which a wave is late.
+    late: usize,
 }
 
 /// What has changed in a machine since it was commissioned.
@@ -112,6 +116,7 @@ impl Machine {
         if let Some(factor) = fault.modes {
             specimen.stiffness.iter_mut().for_each(|stiffness| *stiffness *= factor * factor);
         }
+        let of = |rows: [[f64; 6]; 6]| Matrix6::from_fn(|i, j| rows[i][j]);
         let rest = model.rest_voltage() - model.actuator.voltage[0];
         let mut rig = PlatformRig::new(&specimen, &Noise::of(&specimen), noise);
         rig.prepare(&Preparation::of(&leg, rest));
@@ -124,6 +129,8 @@ impl Machine {
             lags: specimen.legs.each_ref().map(|leg| leg.tau_amp_s),
             other,
             gauges,
+            per_reading: of(leg_jacobian(&model.geometry).unwrap()) * of(poses_per_reading(model).unwrap().unwrap()),
+            late: noise as usize * 67 % 400,
         }
     }
 
@@ -135,33 +142,29 @@ impl Machine {
         readings
     }
 
-    /// Displacement per volt in the second of two strokes of a leg by 20 V, by rows of 20 ms.
-    fn strokes(&mut self, leg: usize, per_reading: &Matrix6<f64>) -> f64 {
+    /// Displacement per volt in two strokes of a leg by 20 V, which begin so many ticks after the first of the rows, of 5 ms.
+    fn strokes(&mut self, leg: usize, late: usize) -> f64 {
         let (mut volts, mut moved) = (Vec::new(), Vec::new());
-        for _ in 0..50 {
+        for row in 0..320 {
             let mut sums = [0.0; 2];
-            for k in 0..200 {
-                let time = (volts.len() * 200 + k) as f64 * self.period;
-                let height = 10.0 * (1.0 - (TAU * 2.0 * time).cos());
-                let readings = self.tick(leg, height);
-                sums =
-                    [sums[0] + height / 200.0, sums[1] + (per_reading.row(leg) * Vector6::from(readings))[0] / 200.0];
+            for k in 0..50 {
+                let time = (row * 50 + k) as f64 * self.period - (0.3 + late as f64 * self.period);
+                let height = if (0.0..1.0).contains(&time) { 10.0 * (1.0 - (TAU * 2.0 * time).cos()) } else { 0.0 };
+                let readings = Vector6::from(self.tick(leg, height));
+                sums = [sums[0] + height / 50.0, sums[1] + (self.per_reading.row(leg) * readings)[0] / 50.0];
             }
             volts.push(sums[0]);
             moved.push(sums[1]);
         }
-        gain_of_strokes(&volts[25..], &moved[25..]).unwrap()
+        gain_of_strokes(&volts, &moved).unwrap()
     }
 
     /// Strokes and sweeps of all legs.
     fn measured(&mut self, compiled: &Compilation) -> (OpenResponse, [f64; 6]) {
         let sweep = Sweep::of(compiled, compiled.model.actuator.leg_gain(), 16_400);
-        let of = |rows: [[f64; 6]; 6]| Matrix6::from_fn(|i, j| rows[i][j]);
-        let per_reading = of(leg_jacobian(&compiled.model.geometry).unwrap())
-            * of(poses_per_reading(&compiled.model).unwrap().unwrap());
         let mut strokes = [0.0; 6];
         let records = std::array::from_fn(|leg| {
-            strokes[leg] = self.strokes(leg, &per_reading);
+            strokes[leg] = self.strokes(leg, self.late + 31 * leg);
             self.rig.hold(&[self.rest; 6], 1.0);
             self.record(&sweep, leg)
         });
@@ -317,6 +320,24 @@ fn health(compiled: &Compilation, changed: std::ops::Range<u64>, same: std::ops:
 #[test]
 fn a_check_finds_what_has_changed_and_nothing_else() {
     assert_eq!(health(&reference(), 0..2, 1..3), ([2; 3], 0));
+}
+
+/// Wherever the strokes begin in a row, and whatever the legs did before.
+#[test]
+fn gains_of_strokes_repeat() {
+    let compiled = reference();
+    for seed in 0..6 {
+        let gains = [1, 6].map(|noise| {
+            let mut machine = Machine::with(&compiled, seed, &Fault::default(), 100 * noise + seed);
+            if noise > 1 {
+                machine.used(seed);
+            }
+            std::array::from_fn::<f64, 6, _>(|leg| machine.strokes(leg, machine.late + 31 * leg))
+        });
+        let off = (0..6).map(|leg| (gains[1][leg] / gains[0][leg] - 1.0).abs()).fold(0.0, f64::max);
+        println!("machine {seed}: gains repeat within {:.2} %", 100.0 * off);
+        assert!(off < 6e-3, "machine {seed}: {gains:?}");
+    }
 }
 
 #[test]
