@@ -17,7 +17,6 @@ mod wave;
 use specgen_language::model::MAX_GRID;
 use specgen_numerics::largest;
 
-pub use groups::SPREAD;
 use groups::{Group, Search};
 use timing::Timing;
 use wave::{Shape, Tone, Wave};

@@ -14,7 +14,7 @@ use crate::staircase::saturate;
 const REACH: f64 = 0.96;
 /// The stroke of each leg may be larger or smaller than that of the spec by this factor, and a drive then still fits, if the other legs
 /// can make room for it.
-pub const SPREAD: f64 = 1.15;
+const SPREAD: f64 = 1.15;
 /// Time for which the supervisor of an open drive looks ahead, s.
 const AHEAD: f64 = 2e-3;
 /// Least part of its range that a leg must move.

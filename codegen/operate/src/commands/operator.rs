@@ -157,6 +157,20 @@ impl<P: Port> Operator<P> {
         done
     }
 
+    /// Polls the machine during work that waits for a disk: that may take longer than the machine waits for its host.
+    pub(crate) fn beside<R: Send>(&mut self, work: impl FnOnce() -> R + Send) -> Result<R, SessionError> {
+        std::thread::scope(|scope| {
+            let worker = scope.spawn(work);
+            while !worker.is_finished() {
+                std::thread::sleep(Duration::from_millis(1));
+                if self.session.due().is_zero() {
+                    self.look()?;
+                }
+            }
+            worker.join().map_err(|_| SessionError::Fault("writing a file crashed".to_owned()))
+        })
+    }
+
     fn stopped_by_others(&self) -> SessionError {
         SessionError::Fault(format!("the machine was stopped, and is {}, at tick {}", self.state(), self.status().tick))
     }
@@ -505,7 +519,7 @@ impl<P: Port> Operator<P> {
 
     fn download(&mut self, path: &Path) -> Result<DownloadReport, SessionError> {
         let bytes = self.record()?;
-        write_file(path, &bytes).map_err(SessionError::Failed)?;
+        self.beside(|| write_file(path, &bytes))?.map_err(SessionError::Failed)?;
         Ok(DownloadReport { file: path.display().to_string(), bytes: bytes.len() })
     }
 

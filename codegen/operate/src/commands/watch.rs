@@ -228,7 +228,10 @@ impl<P: Port> Operator<P> {
         let ticks = (seconds / period).ceil() as u64;
         let ended = self.take(ticks, None, &mut watched, &mut sink, ui);
         // Keep the samples so far, even after an error.
-        sink.finish()?;
+        match ended {
+            Ok(()) => self.beside(|| sink.finish())??,
+            Err(_) => sink.finish()?,
+        }
         ended?;
         self.session.stream(0)?;
         self.note(line, &watched, ui);
@@ -267,7 +270,7 @@ impl<P: Port> Operator<P> {
             let text = watched.text();
             return Err(SessionError::Fault(format!("{}: record it again, on a less busy computer", text.trim_end())));
         }
-        sink.finish()?;
+        self.beside(|| sink.finish())??;
         ui.progress(watched.text().trim_end());
         Ok(())
     }

@@ -65,10 +65,10 @@ fn bench(compiled: &Compilation, gain: f64, mains: f64) -> Option<Bench> {
     })
 }
 
-/// Lowest and highest reading of each gauge in all drives, m, of legs with up to the gain that they are planned for.
+/// Lowest and highest reading of each gauge in all drives, m.
 pub(super) fn travel(compiled: &Compilation, plan: &Plan) -> Option<[[f64; 2]; 6]> {
     let (readings, actuator) = (compiled.ir.supervision.readings_per_leg?, &compiled.model.actuator);
-    let gain = assembled::SPREAD * actuator.leg_gain();
+    let gain = actuator.leg_gain();
     let mut travel = [[0.0; 2]; 6];
     for (drive, end) in plan.drives.iter().flat_map(|drive| drive.range.map(|end| (drive, end))) {
         let legs = drive.held.iter().enumerate().map(|(leg, held)| if drive.legs.contains(&leg) { end } else { *held });

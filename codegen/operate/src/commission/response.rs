@@ -103,7 +103,7 @@ pub(super) fn measure(
         rest(machine, sweep.seconds + sweep.rest[1], ui)?;
         machine.session.recorder(RecorderAction::Stop)?;
         let bytes = machine.record()?;
-        write_file(&path, &bytes).map_err(SessionError::Failed)?;
+        machine.beside(|| write_file(&path, &bytes))?.map_err(SessionError::Failed)?;
     }
     Ok(())
 }
