@@ -351,12 +351,15 @@ impl Work<'_> {
                     Ok(())
                 })?;
             }
-            Step::Response => self.powered(|machine, ui| {
-                machine::drive(machine, ui)?;
-                response::measure(machine, (compiled, state.spec_gain), folder, RESPONSE, ui)
-            })?,
+            Step::Response => {
+                let plan = self.plan(state)?;
+                self.powered(|machine, ui| {
+                    machine::drive(machine, ui)?;
+                    response::measure(machine, (compiled, state.spec_gain, &plan), folder, RESPONSE, ui)
+                })?;
+            }
             Step::CrossTalk | Step::Curves => self.drives(step, &self.plan(state)?)?,
-            Step::Identify => self.identify(state)?,
+            Step::Identify => self.identify(state, true)?,
             Step::Spec => self.write_spec(state)?,
             Step::Acceptance => {
                 self.powered(|machine, ui| acceptance::measure(machine, compiled, state, folder, ui))?;
@@ -372,8 +375,8 @@ impl Work<'_> {
         Ok(())
     }
 
-    /// The model of each leg, from its records.
-    fn identify(&mut self, state: &mut State) -> Result<(), Failure> {
+    /// The model of each leg, from its records; whether its table is written.
+    fn identify(&mut self, state: &mut State, writes: bool) -> Result<(), Failure> {
         let (folder, compiled) = (&self.options.output, self.compiled);
         let plan = self.plan(state)?;
         let known = state.cross_talk.as_ref().map(|found| found.matrix).or(compiled.model.actuator.cross_talk);
@@ -387,10 +390,12 @@ impl Work<'_> {
         let bench = (&known.unwrap_or_default(), &delays);
         let model = self.options.model;
         let found = self.ui.during("identifying the legs", || legs::models(folder, compiled, &plan, bench, model))?;
-        // Until the spec is written again, its tables are others than those of the digest.
-        state.replacing |= state.written.as_ref() == Some(&compiled.ir.digest);
-        state.write(folder)?;
-        state.legs = legs::write(folder, compiled, &plan, found, self.ui)?;
+        if writes {
+            // Until the spec is written again, its tables are others than those of the digest.
+            state.replacing |= state.written.as_ref() == Some(&compiled.ir.digest);
+            state.write(folder)?;
+        }
+        state.legs = legs::results((folder, writes), compiled, &plan, found, self.ui)?;
         Ok(())
     }
 
@@ -484,7 +489,8 @@ impl Work<'_> {
                 acceptance::evaluate(folder, self.compiled, state, self.ui)?;
                 state.learned = learned::figures(folder, self.compiled)?;
             }
-            Step::Identify if state.legs.is_empty() => self.identify(state)?,
+            // The commissioned spec names the tables: a report leaves them as they are.
+            Step::Identify if state.legs.is_empty() => self.identify(state, false)?,
             Step::Curves | Step::Identify | Step::Spec => {}
         }
         Ok(())

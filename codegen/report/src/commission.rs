@@ -86,7 +86,7 @@ fn section(text: &str, state: &Value, folder: &Path) -> Section {
         "Before and after" => ("before", Vec::new()),
         "Acceptance" => ("acceptance", hold(folder).into_iter().collect()),
         "Sensitivity |S|" => ("sensitivity", vec![sensitivity(state)]),
-        "LearnedFigure" => ("learned", Vec::new()),
+        "Learned" => ("learned", Vec::new()),
         "Findings" => ("findings", Vec::new()),
         _ => ("more", Vec::new()),
     };

@@ -13,9 +13,8 @@ use crate::time::{MICROSECOND, Time};
 
 /// Most bytes that wait for the board: a host that sends more is held up.
 const WAITING: usize = 4096;
-/// A host asks every 20 ms (`specgen_operate::POLL_INTERVAL`), and more often for samples, of which a board keeps some blocks: below
-/// the time of one, so that none is lost on a loaded computer.
-const SILENCE: Time = 15_000 * MICROSECOND;
+/// A host asks every 20 ms (`specgen_operate::POLL_INTERVAL`): half of what a board may take for a loss (100 ms).
+const SILENCE: Time = 50_000 * MICROSECOND;
 
 pub struct Line {
     listener: UnixListener,

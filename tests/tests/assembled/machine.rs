@@ -108,7 +108,9 @@ impl Machine {
                     let volts = if drive.legs.contains(&leg) { volts[leg] } else { *held };
                     let _ = write!(text, ",{:e}", volts as f32);
                 }
-                seen.iter().for_each(|length| drop(write!(text, ",{:e}", *length as f32)));
+                for length in seen {
+                    let _ = write!(text, ",{:e}", length as f32);
+                }
                 text.push('\n');
             }
             begun += drive.rest_before + rows as f64 * every as f64 * TICK;
@@ -122,7 +124,7 @@ impl Machine {
     fn lengths(&self, moved: &[f64; 6], time: f64, seconds: f64, noise: &mut Gaussian) -> [f64; 6] {
         let angle = std::f64::consts::PI * 50.0 * seconds;
         let gauge = |number: usize, noise: &mut Gaussian| {
-            let sign = if number % 2 == 0 { 1.0 } else { -1.0 };
+            let sign = if number.is_multiple_of(2) { 1.0 } else { -1.0 };
             let hum = MAINS * angle.sin() / angle * (std::f64::consts::TAU * 50.0 * time + number as f64).sin();
             noise.draw() * NOISE / (seconds / TICK).sqrt() + sign * DRIFT * time + hum
         };
@@ -140,14 +142,15 @@ impl Machine {
             plant.hold(drive.voltage(0.0), drive.rest_before);
             let every = every.unwrap_or(drive.average as usize);
             let rows = (self.before + (drive.seconds() / TICK).round() as usize) / every + AFTER;
-            let mut means = [vec![0.0; rows], vec![0.0; rows]];
+            let mut means = [Vec::new(), Vec::new()];
             for row in 0..rows {
+                let mut sums = [0.0; 2];
                 for tick in row * every..(row + 1) * every {
                     let now = drive.voltage(tick as f64 + 1.0 - self.before as f64);
                     plant.hold(now, TICK);
-                    means[0][row] += now / every as f64;
-                    means[1][row] += plant.displacement() / every as f64;
+                    sums = [sums[0] + now, sums[1] + plant.displacement()];
                 }
+                means.iter_mut().zip(sums).for_each(|(means, sum)| means.push(sum / every as f64));
             }
             if matches!(drive.kind, Kind::Curves { .. }) {
                 return (drive.clone(), means);

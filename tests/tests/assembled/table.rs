@@ -36,7 +36,7 @@ fn compared(found: &EverettTable, truth: &EverettTable) -> [f64; 3] {
 }
 
 /// The worst of scale − 1, shape rms and maximum of six legs, against both references.
-fn worst(machine: &Machine, pairs: bool, kind: LegModelKind) -> [[f64; 3]; 2] {
+fn worst(machine: &Machine, pairs: bool) -> [[f64; 3]; 2] {
     let compiled = compile_text(&edited("reference.toml", &[])).unwrap();
     let gain = reference().stroke[0] / 100.0;
     let single = plan::of(&compiled, gain, 32, 50.0, false).unwrap_or_else(|failure| panic!("{}", failure.message()));
@@ -44,12 +44,11 @@ fn worst(machine: &Machine, pairs: bool, kind: LegModelKind) -> [[f64; 3]; 2] {
     let folder = scratch("assembled");
     machine.record(&planned, &folder);
     let coupling = legs::cross_talk(&folder, &planned).unwrap_or_else(|failure| panic!("{}", failure.message())).matrix;
-    let found = legs::models(&folder, &compiled, &planned, (&coupling, &[machine.delay(); 6]), kind);
+    let found = legs::models(&folder, &compiled, &planned, (&coupling, &[machine.delay(); 6]), LegModelKind::Preisach);
     let found = found.unwrap_or_else(|failure| panic!("{}", failure.message()));
     let references = references(machine, &planned);
     let mut most = [[0.0; 3]; 2];
-    for (leg, (choice, arbitrary)) in found.iter().enumerate() {
-        println!("  leg {leg}: {}, arbitrary record {:.1} nm", choice.family.name(), arbitrary.unwrap() * 1e9);
+    for (leg, (choice, _)) in found.iter().enumerate() {
         for (most, reference) in most.iter_mut().zip(&references) {
             let [scale, rms, largest] = compared(&choice.model.table, reference);
             let values = [(scale / machine.gains[leg] - 1.0).abs(), rms, largest];
@@ -78,19 +77,9 @@ fn commissioned_tables_are_those_of_perfect_records() {
         let machine = Machine::random(&bench, seed);
         for pairs in length(&[true][..], &[false, true]) {
             println!("machine {seed}, class {}, pairs {pairs}:", seed % 3);
-            let [[scale, rms, largest], usual] = worst(&machine, *pairs, LegModelKind::Preisach);
+            let [[scale, rms, largest], usual] = worst(&machine, *pairs);
             assert!(rms <= 1.5e-9 && largest <= 8e-9 && scale <= 5e-3, "machine {seed}");
             assert!(usual[1] <= 8e-9, "machine {seed}");
         }
-    }
-}
-
-/// The arbitrary record tells good models of a leg from bad ones.
-#[test]
-#[ignore = "long: every family for 18 legs"]
-fn models_of_commissioned_legs_predict_their_arbitrary_records() {
-    for seed in 0..3 {
-        println!("machine {seed}:");
-        worst(&Machine::random(&reference(), seed), true, LegModelKind::Auto);
     }
 }

@@ -37,8 +37,8 @@ impl Work<'_> {
         if self.line.is_none() {
             return Err(no_line());
         }
-        let plan = PlanReport::check(state);
-        if !self.agreed(&plan)? {
+        let plan = self.plan(state)?;
+        if !self.agreed(&PlanReport::check(state))? {
             return Err(Failure::Usage("nothing was sent and nothing compared: give --yes".to_owned()));
         }
         let path = record(folder, NOISE_RECORD);
@@ -48,7 +48,7 @@ impl Work<'_> {
             machine::arm(machine, ui)?;
             machine.record_rows((every, u32::MAX), [0.0, REST[0]], &path, &mut |_| Ok(()), ui)?;
             machine::request(machine, Request::Drive, Phase::Driving, ui)?;
-            response::measure(machine, (self.compiled, state.spec_gain), folder, CHECK, ui)
+            response::measure(machine, (self.compiled, state.spec_gain, &plan), folder, CHECK, ui)
         })?;
         let now = response::found(folder, CHECK, self.compiled, &state::today())?;
         let mut health = Health::of((&kept.found, &kept.strokes), (&now.found, &now.strokes));

@@ -70,12 +70,12 @@ pub fn models(
     each.collect()
 }
 
-/// Writes the tables of the legs, `leg0.csv` to `leg5.csv`, and shows what to know of them. Returns their figures.
+/// Figures of the legs; shows what to know of them, and `writes` their tables, `leg0.csv` to `leg5.csv`, into the folder.
 ///
 /// # Errors
 /// A file cannot be written.
-pub(super) fn write(
-    folder: &Path,
+pub(super) fn results(
+    (folder, writes): (&Path, bool),
     compiled: &Compilation,
     plan: &Plan,
     found: Vec<LegResult>,
@@ -97,8 +97,10 @@ pub(super) fn write(
             arbitrary_rms,
             record: records(plan, number).next().map(|drive| format!("{}.csv", drive.name)).unwrap_or_default(),
         });
-        // A spec that was commissioned before names it.
-        edit_file(&record(folder, &format!("leg{number}")), write_leg_csv(&model).as_bytes())?;
+        if writes {
+            // A spec that was commissioned before names it.
+            edit_file(&record(folder, &format!("leg{number}")), write_leg_csv(&model).as_bytes())?;
+        }
     }
     Ok(legs)
 }

@@ -219,8 +219,8 @@ fn learned(state: &State, text: &mut String) {
     if state.learned.is_empty() {
         return;
     }
-    let _ = writeln!(text, "\n## LearnedFigure\n\n```text");
-    let columns = [left(24), right(13), right(13), right(8), left(0).behind("  ")];
+    let _ = writeln!(text, "\n## Learned\n\n```text");
+    let columns = [left(18), right(12), right(12), right(8), left(0).behind("  ")];
     row(text, &columns, &[&"trajectory, xyz", &"before", &"after", &"passes", &"correction"]);
     for LearnedFigure { trajectory, before, after, passes, correction } in &state.learned {
         row(text, &columns, &[trajectory, &nano(0, *before), &nano(0, *after), passes, correction]);

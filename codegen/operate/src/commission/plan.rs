@@ -11,7 +11,7 @@ use super::state::Step;
 pub(super) const MARGIN: f64 = 1.0;
 pub(super) const REST: f64 = 0.6;
 /// Time of the response of all legs, s, with the downloads over a serial line.
-const RESPONSE: f64 = 90.0;
+const RESPONSE: f64 = 105.0;
 /// Part of the voltage that curves may leave out.
 const SHORT: f64 = 1e-2;
 

@@ -1,7 +1,8 @@
 //! The response of the assembled platform at rest: a stroke and a sweep of each leg in open drive, recorded tick by tick; what they
 //! show, and whether the machine agrees with its spec.
 //!
-//! The stroke shows the gain, and gives every sweep the same history: a repetition has the same bias of hysteresis.
+//! The stroke shows the gain. It and full strokes before it give every sweep the same history: a repetition has the same bias of
+//! hysteresis.
 
 use std::f64::consts::PI;
 use std::fmt::Write as _;
@@ -9,6 +10,7 @@ use std::path::Path;
 
 use host_sim::record::{FileItem, Reader};
 use specgen_compiler::compile::Compilation;
+use specgen_identify::assembled::{Kind, Plan};
 use specgen_identify::{MAX_FILE_BYTES, Parameter};
 use specgen_language::files;
 use specgen_language::outcome::Failure;
@@ -18,7 +20,7 @@ use specgen_language::ui::Ui;
 use specgen_link::RecorderAction;
 use specgen_studies::open_response::{OpenResponse, Sweep, SweepRecord, gain_of_strokes};
 
-use super::machine::{Machine, rest};
+use super::machine::{Machine, play, rest};
 use super::plan;
 use super::rows::Rows;
 use super::state::{Response, record};
@@ -69,11 +71,20 @@ pub(super) fn remove(path: &Path) -> Result<(), Failure> {
 /// Records strokes and a sweep of each leg, except where there are records; the machine drives.
 pub(super) fn measure(
     machine: &mut Machine,
-    (compiled, gain): (&Compilation, f64),
+    (compiled, gain, plan): (&Compilation, f64, &Plan),
     folder: &Path,
     prefix: &str,
     ui: &Ui,
 ) -> Result<(), SessionError> {
+    // Full strokes leave the same history, whatever the machine did before.
+    let before = plan.drives.iter().filter(|drive| drive.kind == Kind::Preconditioning);
+    let mut legs: Vec<&[usize]> = Vec::new();
+    for drive in before {
+        if !legs.contains(&drive.legs.as_slice()) {
+            legs.push(&drive.legs);
+            play(machine, drive, folder, ui)?;
+        }
+    }
     let capacity = machine.session.recorder(RecorderAction::Look)?.capacity;
     let sweep = Sweep::of(compiled, gain, capacity);
     let period = compiled.model.timing.period;
@@ -241,10 +252,9 @@ impl Response {
             let Parameter { value, error } = self.found.dead_time;
             say.push(format!(
                 "dead time of the amplifiers is {:.0} ± {:.0} us, which no key of a spec describes: find its cause, such as a filter or \
-                 a converter; `specgen sim --latency {}` shows what it does to the loop",
+                 a converter; `--latency` of `specgen sim`, in ticks, shows what it does to the loop",
                 value * 1e6,
                 error * 1e6,
-                libm::ceil(value / period)
             ));
         }
         let spec = compiled.model.amplifier.lag;

@@ -121,7 +121,6 @@ pub fn long(root: &Path) -> Outcome {
     each(root, &[SPECGEN, TOOL], |trial| {
         run(trial, false)?;
         run(&Trial { cycles: true, ..trial.clone() }, false)?;
-        commission::run(trial)?;
         faults::run(trial, None)?;
         wiring::run(trial)
     })
