@@ -151,7 +151,7 @@ fn of_axis(model: &Model, stroke: f64, axis: usize, declared: f64, [low, high]: 
         (codes::WORKSPACE_UNREACHABLE, binds, "use legs with more stroke")
     };
     let (axis, declared, low, high) = (AXES[axis], declared * scale, fixed(low * scale, 2), fixed(high * scale, 2));
-    Some(Diagnostic::at(
+    let mut finding = Diagnostic::at(
         &model.spans,
         &[&key, table, "workspace"],
         code,
@@ -159,7 +159,12 @@ fn of_axis(model: &Model, stroke: f64, axis: usize, declared: f64, [low, high]: 
             "no pose reaches |{axis}| = {declared:.2} {unit}: {binds}, and from its middle this axis alone moves from {low} to {high} {unit}"
         ),
         format!("{most}; check the unit, or {way_out}"),
-    ))
+    );
+    // Measured legs are what they are; a declared stroke may be the mistake.
+    let is_measured = stroke < model.actuator.stroke && finding.key == key;
+    finding.replacement =
+        is_measured.then(|| format!("\"{} {unit}\"", shown(if seen < furthest { seen } else { furthest })));
+    Some(finding)
 }
 
 /// Explains that the identified table limits the travel, not the declared stroke.

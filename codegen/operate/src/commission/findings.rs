@@ -1,4 +1,4 @@
-//! Figures of the acceptance that are far from their simulation.
+//! What a user has to know: a workspace that was narrowed, and figures of the acceptance that are far from their simulation.
 
 use super::state::{Figure, State};
 use crate::place::AXES;
@@ -6,7 +6,7 @@ use crate::place::AXES;
 /// A figure beyond this many times its simulation, and further from it than the noise at rest, is a finding.
 const FAR: f64 = 1.5;
 
-/// Figures that are far from their simulation, as sentences.
+/// They, as sentences.
 pub(super) fn findings(state: &State) -> Vec<String> {
     // Of the noise at rest in three axes, the norm.
     let noise = |axis: usize| {
@@ -35,7 +35,7 @@ pub(super) fn findings(state: &State) -> Vec<String> {
         (!axes.is_empty())
             .then(|| format!("|S| at {} Hz, {}: above {FAR} times that of the spec", one.hertz, axes.join(" ")))
     });
-    figures.chain(loops).collect()
+    state.narrowed.iter().cloned().chain(figures).chain(loops).collect()
 }
 
 #[cfg(test)]

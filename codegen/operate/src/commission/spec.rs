@@ -4,6 +4,7 @@ use std::path::{Component, Path};
 
 use specgen_compiler::compile::{self, Compilation};
 use specgen_identify::Parameter;
+use specgen_language::diagnostic::{Diagnostic, Place, codes};
 use specgen_language::model::{StructuralKind, StructuralMode};
 use specgen_language::outcome::Failure;
 use specgen_language::spec::SpecSource;
@@ -19,23 +20,44 @@ const MOST_DAMPING: f64 = 0.3;
 const RATE: [&str; 4] = ["rate", "creep_times", "creep_weights", "rate_tables"];
 
 /// The text of a spec with the findings of `state`, and its compilation. `folder`: of the records, from `dir`, that of the new spec;
-/// empty if it is the same.
+/// empty if it is the same. A workspace that weak legs do not reach is narrowed, which `state` notes.
 ///
 /// # Errors
 /// The compiler refuses the text.
 pub(super) fn edited(
     compiled: &Compilation,
-    state: &State,
+    state: &mut State,
     folder: &str,
     dir: &Path,
 ) -> Result<(String, Compilation), Failure> {
     let sizes = (compiled.model.actuator.stacks, compiled.model.hysteresis.grid);
     let known = &compiled.model.structural_modes;
-    let text = with(&compiled.source.text, state, folder, (sizes, (known, compiled.model.timing.period)))
+    let mut text = with(&compiled.source.text, state, folder, (sizes, (known, compiled.model.timing.period)))
         .map_err(Failure::Gate)?;
-    let source =
-        SpecSource { text: text.clone(), dir: dir.to_owned(), display_name: "the commissioned spec".to_owned() };
-    Ok((text, compile::compile_source(source)?))
+    state.narrowed.clear();
+    loop {
+        let source =
+            SpecSource { text: text.clone(), dir: dir.to_owned(), display_name: "the commissioned spec".to_owned() };
+        match compile::compile_source(source) {
+            Ok(new) => return Ok((text, new)),
+            Err(refusal) => match narrowed(&text, &refusal.findings) {
+                Some((new, lines)) if state.narrowed.is_empty() => (text, state.narrowed) = (new, lines),
+                _ => return Err(refusal.into()),
+            },
+        }
+    }
+}
+
+/// The text with the workspace that the measured legs reach, and what has changed; none if that is not what is refused.
+fn narrowed(text: &str, findings: &[Diagnostic]) -> Option<(String, Vec<String>)> {
+    let (mut text, mut lines) = (text.to_owned(), Vec::new());
+    let beyond = findings.iter().rev().filter(|found| found.code == codes::AXIS_UNREACHABLE.id);
+    for found in beyond {
+        let (Place::Spec(span), Some(new)) = (&found.place, &found.replacement) else { continue };
+        lines.insert(0, format!("{} is {new}, not {}: the legs reach no further", found.key, &text[span.clone()]));
+        text.replace_range(span.clone(), new);
+    }
+    (!lines.is_empty()).then_some((text, lines))
 }
 
 /// The text of a spec with what was found; `grid`: cells of the tables, `known`: its structural modes.
@@ -311,6 +333,26 @@ mod tests {
         let known = [own(StructuralKind::Gauge, Some(3), 1110.0), own(StructuralKind::Leg, Some(1), 1200.0)];
         let again = with(text, &state, "", ((5, 32), (&known, 1e-4))).unwrap();
         assert!(!again.contains("gauge 4") && again.contains("at = \"leg 2\""), "{again}");
+    }
+
+    #[test]
+    fn a_workspace_beyond_weak_legs_is_narrowed() {
+        let text = "[workspace]\ntranslation = [\"50 um\", \"50 um\", \"52 um\"]\n";
+        let at = |value: &str, from: usize| text[from..].find(value).map(|start| from + start).unwrap();
+        let finding = |key: &str, start: usize, new: &str| {
+            let mut one = Diagnostic::new(codes::AXIS_UNREACHABLE, key, Place::Spec(start..start + 7), "", "");
+            one.replacement = Some(new.to_owned());
+            one
+        };
+        let findings = [
+            finding("workspace.translation[0]", first, "\"47.95 um\""),
+            finding("workspace.translation[2]", at("\"52 um\"", 0), "\"49.1 um\""),
+        ];
+        let (new, lines) = narrowed(text, &findings).unwrap();
+        assert_eq!(new, "[workspace]\ntranslation = [\"47.95 um\", \"50 um\", \"49.1 um\"]\n");
+        assert_eq!(lines[0], "workspace.translation[0] is \"47.95 um\", not \"50 um\": the legs reach no further");
+        assert!(lines[1].starts_with("workspace.translation[2]"), "{lines:?}");
+        assert!(narrowed(text, &[]).is_none());
     }
 
     #[test]

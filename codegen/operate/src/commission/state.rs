@@ -202,6 +202,9 @@ pub(super) struct State {
     /// Digest of the spec that was written.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub written: Option<String>,
+    /// What the written spec has of the workspace, and why.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub narrowed: Vec<String>,
     /// Tables that the written spec names are replaced, or were and the spec was not: it has another digest than the one above.
     #[serde(default, skip_serializing_if = "core::ops::Not::not")]
     pub replacing: bool,
