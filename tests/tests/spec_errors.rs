@@ -67,7 +67,7 @@ impl Bench {
             ("hysteresis", _) if key.name == "rate_tables" => Choice { dynamic: true, ..PLATFORM },
             ("hysteresis", _) if key.name == "dead_time" => LEGS,
             ("trajectory", _) => Choice {
-                waveform: matches!(key.name, "file" | "period" | "repeat"),
+                waveform: matches!(key.name, "file" | "period" | "repeat" | "columns"),
                 step: matches!(key.name, "to" | "time"),
                 ..PLATFORM
             },

@@ -92,7 +92,7 @@ pub const LEGS: Choice =
 impl Choice {
     /// Whether the key stands in the text.
     fn takes(self, section: &Section, key: &Key) -> bool {
-        let of_waveform = matches!(key.name, "file" | "period" | "repeat");
+        let of_waveform = matches!(key.name, "file" | "period" | "repeat" | "columns");
         let of_step = matches!(key.name, "to" | "time");
         match (section.name, key.presence) {
             (_, Presence::InsteadOf(_)) => key.name.ends_with("_weight") == self.weights,

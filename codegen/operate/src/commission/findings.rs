@@ -51,10 +51,9 @@ mod tests {
             computed: Some(3e-9),
             limit: None,
         };
-        let mut state = State::default();
-        state.acceptance = vec![figure("hold, x", 4e-9), figure("circle, xyz", 5.9e-9)];
-        assert!(findings(&state).is_empty(), "{:?}", findings(&state));
-        state.acceptance = vec![figure("hold, x", 6.1e-9), figure("circle, xyz", 9e-9)];
-        assert_eq!(findings(&state), ["hold, x: 2.0 times its simulation", "circle, xyz: 3.0 times its simulation"]);
+        let of = |acceptance: Vec<Figure>| findings(&State { acceptance, ..State::default() });
+        assert!(of(vec![figure("hold, x", 4e-9), figure("circle, xyz", 5.9e-9)]).is_empty());
+        let far = of(vec![figure("hold, x", 6.1e-9), figure("circle, xyz", 9e-9)]);
+        assert_eq!(far, ["hold, x: 2.0 times its simulation", "circle, xyz: 3.0 times its simulation"]);
     }
 }

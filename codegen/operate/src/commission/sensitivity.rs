@@ -130,7 +130,7 @@ impl<'a> Experiment<'a> {
         let mode = start_mode(&self.compiled.model, self.task);
         let open = if mode.inverts() { ControlMode::F(Law::Invhys) } else { mode };
         let word = |(name, word): (&String, &u64)| match name.as_str() {
-            "mode" => u64::from(open.word()),
+            "mode" => open.word(),
             name if !mode.inverts() && is_gain(name) => scalar.encode(0.0),
             _ => *word,
         };

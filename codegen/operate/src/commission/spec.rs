@@ -345,7 +345,7 @@ mod tests {
             one
         };
         let findings = [
-            finding("workspace.translation[0]", first, "\"47.95 um\""),
+            finding("workspace.translation[0]", at("\"50 um\"", 0), "\"47.95 um\""),
             finding("workspace.translation[2]", at("\"52 um\"", 0), "\"49.1 um\""),
         ];
         let (new, lines) = narrowed(text, &findings).unwrap();

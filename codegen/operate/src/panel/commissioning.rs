@@ -15,12 +15,15 @@ use specgen_language::ui::{Message, Ui};
 
 use super::QUERY;
 
+/// A run of the command.
+pub type Run = dyn Fn(&mut Ui) -> Result<(), Failure> + Send + Sync;
+
 /// The command, and what it has to do.
 pub struct Commissioning {
     /// Folder of its records and results.
     pub folder: PathBuf,
     /// Runs it until it is done or `stop` is set.
-    pub run: Arc<dyn Fn(&mut Ui) -> Result<(), Failure> + Send + Sync>,
+    pub run: Arc<Run>,
     /// Steps, time left and findings.
     pub outlook: Box<dyn Fn() -> Result<Value, Failure>>,
     /// Ends it after its present step.

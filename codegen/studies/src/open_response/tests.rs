@@ -149,7 +149,7 @@ impl Machine {
             let mut sums = [0.0; 2];
             for k in 0..50 {
                 let time = (row * 50 + k) as f64 * self.period - (0.3 + late as f64 * self.period);
-                let height = if (0.0..1.0).contains(&time) { 10.0 * (1.0 - (TAU * 2.0 * time).cos()) } else { 0.0 };
+                let height = if (0.0..1.0).contains(&time) { 10.0 * (1.0 - libm::cos(TAU * 2.0 * time)) } else { 0.0 };
                 let readings = Vector6::from(self.tick(leg, height));
                 sums = [sums[0] + height / 50.0, sums[1] + (self.per_reading.row(leg) * readings)[0] / 50.0];
             }
@@ -211,7 +211,7 @@ impl Sweep {
         };
         let [from, to] = self.band;
         let turns = time * (from + 0.5 * (to - from) * time / end);
-        envelope * (self.offset + self.amplitude * (TAU * turns).sin())
+        envelope * (self.offset + self.amplitude * libm::sin(TAU * turns))
     }
 }
 
@@ -241,13 +241,13 @@ fn check(compiled: &Compilation, seed: u64) {
     let delay = worst(&|leg| found.delay_of(leg) - machine.lags[leg]);
     let frequency = worst(&|k| found.modes[k].frequency.value / machine.modes[k][0] - 1.0);
     let zeta = worst(&|k| found.modes[k].zeta.value / machine.modes[k][1] - 1.0);
-    let ratio = (0..6).map(|k| 2.0 * (machine.modes[k][0] / found.modes[k].spec[0]).ln()).sum::<f64>() / 6.0;
+    let ratio = (0..6).map(|k| 2.0 * libm::log(machine.modes[k][0] / found.modes[k].spec[0])).sum::<f64>() / 6.0;
     println!(
         "machine {seed}: delay {:.1} us, modes {:.3} %, damping {:.2} %, k/m {:.3} %, fit {:.2} %",
         1e6 * delay,
         100.0 * frequency,
         100.0 * zeta,
-        100.0 * (found.stiffness_to_mass.value / ratio.exp() - 1.0),
+        100.0 * (found.stiffness_to_mass.value / libm::exp(ratio) - 1.0),
         100.0 * found.misfit
     );
     let lag = machine.lags.iter().sum::<f64>() / 6.0;
@@ -257,7 +257,7 @@ fn check(compiled: &Compilation, seed: u64) {
     println!("  in standard errors: delay {off:.1}, modes {modes:.1}, damping {ratios:.1}");
     assert!(off.abs() < 4.0 && modes < 5.0 && ratios < 5.0, "machine {seed}: {found:?}");
     assert!(delay <= 20e-6 && frequency <= 2e-3 && zeta <= 0.02, "machine {seed}: {found:?}");
-    assert!((found.stiffness_to_mass.value / ratio.exp() - 1.0).abs() < 2e-3, "machine {seed}");
+    assert!((found.stiffness_to_mass.value / libm::exp(ratio) - 1.0).abs() < 2e-3, "machine {seed}");
     let StructuralMode { place, frequency_hz, damping_ratio, participation } = machine.other;
     let [other] = &found.others[..] else { panic!("machine {seed}: {:?}, there is {:?}", found.others, machine.other) };
     assert!(!other.known && other.place == place.to_string(), "machine {seed}: {other:?}");
