@@ -96,9 +96,33 @@ pub struct Options {
     pub stop: Arc<AtomicBool>,
 }
 
+impl Options {
+    /// All open steps of a spec in a folder, after a question.
+    pub fn new(spec: &Path, output: &Path) -> Self {
+        Self {
+            spec: spec.to_owned(),
+            output: output.to_owned(),
+            steps: Vec::new(),
+            again: false,
+            skip: Vec::new(),
+            grid: None,
+            mains: None,
+            model: LegModelKind::Auto,
+            machine: None,
+            plan: false,
+            yes: false,
+            report: false,
+            write: false,
+            check: false,
+            learn: false,
+            stop: Arc::default(),
+        }
+    }
+}
+
 /// What a commissioning has done and will do, as its folder says: `steps` with `name`, `date` and `skipped`, all empty while open, and
-/// whether the next run does it; `seconds` of machine time of that run; `findings`; `missed` figures; `next` if another controller is
-/// needed.
+/// whether the `next` run does it; `seconds` of machine time of that run; `findings`; `missed` figures; whether it needs the `other`
+/// controller; whether there is a `page`.
 ///
 /// # Errors
 /// As [`run`], before anything moves.
@@ -596,24 +620,7 @@ mod tests {
     use super::*;
 
     fn options(folder: &Path) -> Options {
-        Options {
-            spec: "platform.toml".into(),
-            output: folder.to_owned(),
-            steps: Vec::new(),
-            again: false,
-            skip: Vec::new(),
-            grid: None,
-            mains: None,
-            model: LegModelKind::Auto,
-            machine: None,
-            plan: false,
-            yes: true,
-            report: false,
-            write: false,
-            check: false,
-            learn: false,
-            stop: Arc::default(),
-        }
+        Options { yes: true, ..Options::new(Path::new("platform.toml"), folder) }
     }
 
     fn names(steps: &[Step]) -> Vec<&'static str> {

@@ -277,22 +277,12 @@ fn play(
 /// `specgen commission` on the records of a folder.
 fn commission(compiled: &Compilation, folder: &Path, (grid, model): (usize, LegModelKind), steps: &[Step]) {
     let options = Options {
-        spec: folder.join("draft.toml"),
-        output: folder.to_owned(),
         steps: steps.to_vec(),
-        again: false,
-        skip: Vec::new(),
         grid: Some(grid),
         mains: Some(MAINS),
         model,
-        machine: None,
-        plan: false,
         yes: true,
-        report: false,
-        write: false,
-        check: false,
-        learn: false,
-        stop: Arc::default(),
+        ..Options::new(&folder.join("draft.toml"), folder)
     };
     // A new command: files of another one may be gone.
     specgen::files::forget_inputs();

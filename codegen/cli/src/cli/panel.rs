@@ -8,7 +8,6 @@ use clap::{ArgGroup, Args};
 use specgen_compiler::compile::Compilation;
 use specgen_compiler::spec_file;
 use specgen_language::interrupt;
-use specgen_language::model::LegModelKind;
 use specgen_language::outcome::Failure;
 use specgen_language::ui::Ui;
 use specgen_operate::commission::{self, Options};
@@ -43,24 +42,7 @@ pub struct Arguments {
 fn commissioning(arguments: &Arguments, compiled: &Compilation) -> Option<Commissioning> {
     let (folder, socket) = (arguments.commission.as_ref()?.to_path_buf(), arguments.line.socket()?.to_owned());
     let stop = Arc::<AtomicBool>::default();
-    let options = Options {
-        spec: arguments.spec.to_path_buf(),
-        output: folder.clone(),
-        steps: Vec::new(),
-        again: false,
-        skip: Vec::new(),
-        grid: None,
-        mains: None,
-        model: LegModelKind::Auto,
-        machine: None,
-        plan: false,
-        yes: true,
-        report: false,
-        check: false,
-        write: false,
-        learn: false,
-        stop: stop.clone(),
-    };
+    let options = Options { yes: true, stop: stop.clone(), ..Options::new(&arguments.spec, &folder) };
     let (compiled, seen) = (compiled.clone(), options.clone());
     let outlook = {
         let compiled = compiled.clone();

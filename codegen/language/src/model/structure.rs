@@ -60,6 +60,17 @@ section! {
 }
 
 impl StructuralMode {
+    /// Kind of the mode at a place such as `gauge 2`, and the number of its leg or gauge, from 0.
+    pub fn place_of(at: &str) -> (StructuralKind, Option<usize>) {
+        let mut words = at.split(' ');
+        let kind = match words.next() {
+            Some("leg") => StructuralKind::Leg,
+            Some("gauge") => StructuralKind::Gauge,
+            _ => StructuralKind::Frame,
+        };
+        (kind, words.next().and_then(|number| number.parse::<usize>().ok()?.checked_sub(1)))
+    }
+
     /// Whether two modes, each with kind, number of leg or gauge, and frequency (Hz), count as one: of a kind at the same place with
     /// frequencies that differ by at most 1 %.
     pub fn coincide(
@@ -73,13 +84,7 @@ impl StructuralMode {
 
 /// Kind of the mode at `table`, and the number of its leg or gauge, from 0.
 pub(crate) fn place(fields: &Fields, table: &str) -> Option<(StructuralKind, Option<usize>)> {
-    let mut words = fields.choice(&join(table, "at"))?.split(' ');
-    let kind = match words.next()? {
-        "leg" => StructuralKind::Leg,
-        "gauge" => StructuralKind::Gauge,
-        _ => StructuralKind::Frame,
-    };
-    Some((kind, words.next().and_then(|number| number.parse::<usize>().ok()?.checked_sub(1))))
+    Some(StructuralMode::place_of(fields.choice(&join(table, "at"))?))
 }
 
 section! {

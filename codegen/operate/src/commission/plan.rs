@@ -54,7 +54,7 @@ fn bench(compiled: &Compilation, gain: f64, mains: f64) -> Option<Bench> {
     Some(Bench {
         tick_rate: 1.0 / model.timing.period,
         voltage: [low, high],
-        rest: rest(compiled),
+        rest: model.rest_voltage(),
         slew_rate: model.actuator.slew_rate,
         stroke: [gain * (high - low); 6],
         jacobian: lower::leg_jacobian(&model.geometry)?,
@@ -80,24 +80,6 @@ pub(super) fn travel(compiled: &Compilation, plan: &Plan) -> Option<[[f64; 2]; 6
         }
     }
     Some(travel)
-}
-
-/// Voltage of the legs at rest, V.
-pub(super) fn rest(compiled: &Compilation) -> f64 {
-    let model = &compiled.model;
-    let [from, to] = model.dac.range;
-    let code = f64::from(compiled.ir.supervision.constants.rest);
-    within(from + code * (to - from) / f64::from((1_u32 << model.dac.bits) - 1), model.actuator.voltage)
-}
-
-/// A limit in place of the voltage of a code beside it.
-fn within(volts: f64, [low, high]: [f64; 2]) -> f64 {
-    let near = 1e-3 * (high - low);
-    match volts {
-        _ if volts - low < near => low,
-        _ if high - volts < near => high,
-        _ => volts,
-    }
 }
 
 /// Drives of `steps` that have no record yet, each set of curves after its preconditioning.

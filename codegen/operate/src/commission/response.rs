@@ -21,7 +21,6 @@ use specgen_link::RecorderAction;
 use specgen_studies::open_response::{OpenResponse, Sweep, SweepRecord, gain_of_strokes};
 
 use super::machine::{Machine, play, rest};
-use super::plan;
 use super::rows::Rows;
 use super::state::{Response, record};
 use crate::commands::SessionError;
@@ -120,7 +119,7 @@ pub(super) fn measure(
 }
 
 fn wave(compiled: &Compilation, leg: usize, [ramp, seconds, offset]: [f64; 3], shape: &str) -> String {
-    let center = [plan::rest(compiled); 6];
+    let center = [compiled.model.rest_voltage(); 6];
     format!(
         "drive = true\ncenter = {center:?}\nramp = {ramp:?}\nseconds = {seconds:?}\n\n[[axis]]\naxis = {leg}\n\
          offset = {offset:?}\nshape = {{ {shape} }}\n"
@@ -137,7 +136,7 @@ fn sweep_of(compiled: &Compilation, sweep: &Sweep, leg: usize) -> String {
 /// The strokes of a leg, away from the nearer limit, as the file of a wave, and their duration, s.
 fn strokes_of(compiled: &Compilation, gain: f64, leg: usize) -> (String, f64) {
     let model = &compiled.model;
-    let ([low, high], rest) = (model.actuator.voltage, plan::rest(compiled));
+    let ([low, high], rest) = (model.actuator.voltage, model.rest_voltage());
     let (volts, part, seconds, count) = STROKE;
     let least = |a: f64, b: f64| if b < a { b } else { a };
     let room = model.workspace.bounds()[..3].iter().copied().fold(f64::INFINITY, least);
@@ -221,14 +220,23 @@ fn sweep_record(path: &Path, compiled: &Compilation, leg: usize) -> Result<Sweep
 
 impl Response {
     /// Whether the amplifiers have a dead time that does not look like lag, for ticks of `period`, s.
-    pub(super) fn has_dead_time(&self, period: f64) -> bool {
+    fn has_dead_time(&self, period: f64) -> bool {
         let Parameter { value, error } = self.found.dead_time;
         value > SURE * error && value > LEAST_DEAD_TIME * period
     }
 
+    /// What a spec has as `amplifier.lag`, s, and what it contains: a spec has no dead time, and one that is too small to be certain
+    /// counts as lag.
+    pub(super) fn lag_of_spec(&self, period: f64) -> (Parameter, &'static str) {
+        match self.has_dead_time(period) {
+            true => (self.found.lag, "lag"),
+            false => (self.found.delay, "lag and dead time"),
+        }
+    }
+
     /// With sentences about what disagrees with the spec.
     fn judged(mut self, compiled: &Compilation) -> Self {
-        let OpenResponse { stiffness_to_mass, damping, lag, delay, modes, .. } = &self.found;
+        let OpenResponse { stiffness_to_mass, damping, lag, modes, .. } = &self.found;
         let differs = |of: &Parameter, spec: f64, least: f64| {
             let off = (of.value / spec - 1.0).abs();
             off > least && off * spec > SURE * of.error
@@ -257,12 +265,12 @@ impl Response {
                 error * 1e6,
             ));
         }
-        let spec = compiled.model.amplifier.lag;
-        if (delay.value - spec).abs() > SURE * delay.error && (delay.value - spec).abs() > LEAST[2] * spec {
+        let (spec, (written, what)) = (compiled.model.amplifier.lag, self.lag_of_spec(period));
+        if (written.value - spec).abs() > SURE * written.error && (written.value - spec).abs() > LEAST[2] * spec {
             say.push(format!(
-                "lag and dead time of the amplifiers are {:.0} ± {:.0} us, in the spec {:.0} us: the step `spec` writes amplifier.lag",
-                delay.value * 1e6,
-                delay.error * 1e6,
+                "{what} of the amplifiers: {:.0} ± {:.0} us, in the spec {:.0} us: the step `spec` writes amplifier.lag",
+                written.value * 1e6,
+                written.error * 1e6,
                 spec * 1e6
             ));
         }

@@ -111,8 +111,7 @@ fn with(
     Ok(if text.contains("\r\n") { written.replace("\r\n", "\n").replace('\n', "\r\n") } else { written })
 }
 
-/// Lag, damping and structural modes, as found in the response at rest; returns the keys that are written. A spec has no dead time: one
-/// that is too small to be certain counts as lag.
+/// Lag, damping and structural modes, as found in the response at rest; returns the keys that are written.
 fn dynamics(
     document: &mut DocumentMut,
     response: &Response,
@@ -121,12 +120,12 @@ fn dynamics(
     let Response { found, date, .. } = response;
     let is_sure = |of: &Parameter| of.value > SURE * of.error;
     let mut measured = Vec::new();
-    let (lag, what) = if response.has_dead_time(period) { (found.lag, "") } else { (found.delay, "with dead time, ") };
+    let (lag, what) = response.lag_of_spec(period);
     if is_sure(&lag) {
         let amplifier = document.entry("amplifier").or_insert_with(toml_edit::table);
         let amplifier = amplifier.as_table_mut().ok_or("`amplifier` is not written as a section [amplifier]")?;
         let [value, error] = [lag.value, lag.error].map(|time| time * 1e3);
-        let note = format!("± {error:.4}, {what}mean of the legs, response-leg0.rec and others, measured {date}");
+        let note = format!("± {error:.4}, {what}, mean of the legs, response-leg0.rec and others, measured {date}");
         set(amplifier, "lag", format!("{value:.4} ms").into(), &note);
         measured.push("amplifier.lag");
     }
@@ -140,10 +139,10 @@ fn dynamics(
     let mut listed: Vec<_> = known.iter().map(|mode| (mode.kind, mode.place, mode.frequency)).collect();
     for mode in found.others.iter().filter(|mode| !mode.known) {
         let OtherMode { frequency, zeta, place, participation, .. } = mode;
-        let here = (kind_and_number(place), libm::round(10.0 * frequency.value) / 10.0);
-        let here = (here.0.0, here.0.1, here.1);
+        let (kind, number) = StructuralMode::place_of(place);
+        let here = (kind, number, digits(frequency.value, 10.0));
         // A gauge that moves against its leg would become one of the frame, which acts on all gauges: the page names it.
-        if here.0 == StructuralKind::Frame || listed.iter().any(|other| StructuralMode::coincide(here, *other)) {
+        if kind == StructuralKind::Frame || listed.iter().any(|other| StructuralMode::coincide(here, *other)) {
             continue;
         }
         listed.push(here);
@@ -154,24 +153,13 @@ fn dynamics(
         set(&mut table, "frequency", format!("{:.1} Hz", here.2).into(), &note);
         set(&mut table, "damping_ratio", digits(zeta.value, 1e4).into(), &format!("± {:.4}", zeta.error));
         table.insert("at", toml_edit::value(place.as_str()));
-        if here.0 != StructuralKind::Leg {
+        if kind != StructuralKind::Leg {
             let note = format!("± {:.3}", participation.error);
             set(&mut table, "participation", digits(participation.value, 1e3).into(), &note);
         }
         all.push(table);
     }
     Ok(measured)
-}
-
-/// Kind of a place such as `gauge 2`, and the number of the leg or gauge, from 0.
-fn kind_and_number(place: &str) -> (StructuralKind, Option<usize>) {
-    let mut words = place.split(' ');
-    let kind = match words.next() {
-        Some("leg") => StructuralKind::Leg,
-        Some("gauge") => StructuralKind::Gauge,
-        _ => StructuralKind::Frame,
-    };
-    (kind, words.next().and_then(|number| number.parse::<usize>().ok()?.checked_sub(1)))
 }
 
 /// Each word once, in order.
@@ -320,7 +308,7 @@ mod tests {
         for part in [
             "assumed = [ \"gauge\"]\n",
             "modal_damping = 0.02123  # ± 0.00002, of the mode at 355.0 Hz, measured 2026-11-29",
-            "[amplifier]\nlag = \"0.3524 ms\"  # ± 0.0014, with dead time",
+            "[amplifier]\nlag = \"0.3524 ms\"  # ± 0.0014, lag and dead time, mean of the legs",
             "[[mode]]\nfrequency = \"1107.2 Hz\"  # ± 0.2, response-leg0.rec and others, measured 2026-11-29\ndamping_ratio = 0.0123",
             "at = \"gauge 4\"\nparticipation = 0.2  # ± 0.010\n",
             "at = \"leg 2\"\n",
